@@ -1,0 +1,270 @@
+"""Kit and its parts: the values that the stages fill, in the order in which data visits them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drkid.mesh import Floats, Ints, TriMesh
+from drkid.solid import Solid
+from drkid.spec import ConnectorKind, KitSpec, Unit
+
+VolumeKind = Literal["labels", "mask", "density"]
+Handedness = Literal["any", "left", "right"]
+Status = Literal["converged", "stalled"]
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a surface comes from: enough to find and cut out the same object again.
+
+    `voxel_size` is (x, y, z) in `voxel_unit`; both are None for a mesh without a unit.
+    """
+
+    name: str
+    sha256: str
+    voxel_size: tuple[float, float, float] | None = None
+    voxel_unit: Unit | None = None
+    label: int | None = None
+    threshold: float | None = None
+    component: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class LabelVolume:
+    """A volume as read: `values` with axes (x, y, z), voxel `spacing` along them in `unit`."""
+
+    values: NDArray[np.generic]
+    spacing: tuple[float, float, float]
+    unit: Unit | None
+    kind: VolumeKind
+    name: str
+    sha256: str
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """M_i: one closed, manifold, outward, connected surface in the source's unit.
+
+    `max_displacement_voxels` bounds how far smoothing moved it (0 for a mesh, or unsmoothed);
+    `touches_border` says that the object was cut off by the end of the volume and closed there;
+    `notes` are sentences that a user should read.
+    """
+
+    mesh: TriMesh
+    source: Source
+    components: int = 1
+    cavities_filled: int = 0
+    debris_dropped: int = 0
+    touches_border: bool = False
+    max_displacement_voxels: float = 0.0
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Simplified:
+    """M_s: the surface with the wanted number of vertices; the energy of the Voronoi tessellation per iteration."""
+
+    mesh: TriMesh
+    energy: tuple[float, ...]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Why a solver stopped, in a word and in a sentence."""
+
+    status: Status
+    message: str
+
+
+@dataclass(frozen=True)
+class Convergence:
+    """One recorded iteration; errors in percent of the mean edge, the energy in the mesh's unit squared."""
+
+    iteration: int
+    energy: float
+    error_max_percent: float
+    error_mean_percent: float
+
+
+@dataclass(frozen=True, eq=False)
+class Decomposition:
+    """M_f and its classes: `face_class` (F,) into `class_lengths` (k, 3), ascending edge lengths.
+
+    `face_errors` (F,) is the Euclidean distance of a face's ascending edge lengths to its class's.
+    """
+
+    mesh: TriMesh
+    face_class: Ints
+    class_lengths: Floats
+    face_errors: Floats
+    iterations: int
+    convergence: tuple[Convergence, ...]
+    outcome: Outcome
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Dimensions:
+    """Lengths in mm that every piece and connector of a kit shares (`fabrication`: the names and formulas).
+
+    `pocket_width_mm` along the side, `pocket_depth_mm` into the piece, `pocket_height_mm` across the middle plane.
+    Fields of the rod are 0 where the connector has none.
+    """
+
+    connector: ConnectorKind
+    thickness_mm: float
+    clearance_mm: float
+    rod_clearance_mm: float
+    min_wall_mm: float
+    knuckle_wall_mm: float
+    knuckle_length_mm: float
+    knuckle_gap_mm: float
+    knuckles: int
+    rod_diameter_mm: float
+    rod_length_mm: float
+    barrel_diameter_mm: float
+    pocket_width_mm: float
+    pocket_depth_mm: float
+    pocket_height_mm: float
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A printed shape of a class, in the part frame of the kit format.
+
+    `corners` (3, 3) counter-clockwise from outside, `side_frames` (3, 4, 4) from connector to part coordinates.
+    """
+
+    class_index: int
+    handedness: Handedness
+    corners: Floats
+    side_frames: Floats
+    solid: Solid
+
+
+@dataclass(frozen=True, eq=False)
+class Connector:
+    """A printed connector, `name` being its file's stem."""
+
+    name: str
+    solid: Solid
+
+
+@dataclass(frozen=True, eq=False)
+class PartSet:
+    """The printed shapes of a kit and how the faces use them.
+
+    `scale_mm_per_unit` takes the decomposition's unit to mm. Face f is made from `parts[face_part[f]]`, whose
+    corner 0 lies at the face's corner `face_turn[f]`. `groove_mm` (E,) is each joint's widest visible gap.
+    """
+
+    scale_mm_per_unit: float
+    dimensions: Dimensions
+    parts: tuple[Part, ...]
+    connectors: tuple[Connector, ...]
+    face_part: Ints
+    face_turn: Ints
+    groove_mm: Floats
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A part at its place: `vertices[i]` of the assembly lies at the part's corner i; `transform` (4, 4)."""
+
+    face: int
+    part: int
+    vertices: tuple[int, int, int]
+    transform: Floats
+
+
+@dataclass(frozen=True)
+class Joint:
+    """An edge between two pieces; the inner dihedral angle is more than 180° where concave."""
+
+    faces: tuple[int, int]
+    edge: tuple[int, int]
+    dihedral_degrees: float
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of the assembly: the face that is added and the placed neighbours it joins."""
+
+    face: int
+    joins: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """Pieces in the order of faces, joints in the order of edges, steps in the order of building."""
+
+    pieces: tuple[Piece, ...]
+    joints: tuple[Joint, ...]
+    steps: tuple[Step, ...]
+
+
+@dataclass(frozen=True)
+class Distance:
+    """Symmetric distance of two surfaces in percent of M_i's bounding-box diagonal."""
+
+    mean_percent: float
+    max_percent: float
+
+
+@dataclass(frozen=True)
+class Metrics:
+    """What tables report; lengths in mm of the printed object."""
+
+    pieces: int
+    classes: int
+    unique_piece_parts: int
+    mean_edge: float
+    error_max: float
+    error_max_percent: float
+    error_mean: float
+    error_mean_percent: float
+    surface_simplified: Distance
+    simplified_assembled: Distance
+    surface_assembled: Distance
+    dihedral_mean_degrees: float
+    dihedral_p95_degrees: float
+    concave_percent: float
+    groove_mean_mm: float
+    groove_max_mm: float
+    genus: int
+    iterations: int
+    seconds: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Kit:
+    """A whole construction kit; every length in mm of the printed object.
+
+    `spec` carries the automatic choices, so that the same kit can be made again from it.
+    """
+
+    spec: KitSpec
+    source: Source
+    surface: TriMesh
+    simplified: TriMesh
+    decomposition: Decomposition
+    part_set: PartSet
+    assembly: Assembly
+    metrics: Metrics
+    notes: tuple[str, ...]
+    writer: Callable[["Kit", Path, bool], Path]
+
+    def write(self, folder: str | Path, *, force: bool = False) -> Path:
+        """Write the kit folder, whole or not at all, and return its path.
+
+        Raises:
+            KitFolderError: the folder exists and `force` is not given, or it cannot be written.
+        """
+        return self.writer(self, Path(folder), force)

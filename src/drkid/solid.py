@@ -1,0 +1,107 @@
+"""Solid: the only door to the CSG kernel (manifold3d)."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import manifold3d
+import numpy as np
+from numpy.typing import ArrayLike
+
+from drkid.mesh import Floats, TriMesh
+
+CIRCLE_SEGMENTS = 48  # facets of a round shape: less than 0.01 mm off the circle at hinge radii
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A closed solid of guaranteed manifoldness. Operations return new solids."""
+
+    body: manifold3d.Manifold
+
+    # ---- made from
+
+    @classmethod
+    def box(cls, low: ArrayLike, high: ArrayLike) -> Self:
+        """The axis-aligned box between two corners (3,)."""
+        low, high = np.asarray(low, float), np.asarray(high, float)
+        return cls(manifold3d.Manifold.cube(tuple(high - low)).translate(tuple(low)))
+
+    @classmethod
+    def cylinder_along_x(cls, radius: float, low: float, high: float) -> Self:
+        """A cylinder about the x axis from x = `low` to x = `high`, its facets tangent to the circle's outside."""
+        tall = manifold3d.Manifold.cylinder(high - low, radius, radius, CIRCLE_SEGMENTS)
+        return cls(tall.rotate((0.0, 90.0, 0.0)).translate((low, 0.0, 0.0)))
+
+    @classmethod
+    def hull(cls, points: ArrayLike) -> Self:
+        """The convex hull of (n, 3) points."""
+        return cls(manifold3d.Manifold.hull_points(np.asarray(points, np.float64)))
+
+    @classmethod
+    def of(cls, mesh: TriMesh) -> Self:
+        """The solid that a closed mesh encloses.
+
+        Raises:
+            ValueError: the kernel does not accept the mesh as a manifold.
+        """
+        body = manifold3d.Manifold(
+            manifold3d.Mesh64(np.array(mesh.vertices, order="C"), np.array(mesh.faces, np.uint64, order="C"))
+        )
+        if body.status() != manifold3d.Error.NoError or body.is_empty():
+            message = f"not a manifold solid: {body.status().name}"
+            raise ValueError(message)
+        return cls(body)
+
+    # ---- combined
+
+    def __add__(self, other: "Solid") -> "Solid":
+        """Union."""
+        return Solid(self.body + other.body)
+
+    def __sub__(self, other: "Solid") -> "Solid":
+        """Difference."""
+        return Solid(self.body - other.body)
+
+    def __and__(self, other: "Solid") -> "Solid":
+        """Intersection."""
+        return Solid(self.body ^ other.body)
+
+    def minus_all(self, others: Iterable["Solid"]) -> "Solid":
+        """Difference with every one of `others`, in one operation."""
+        bodies = [self.body, *(o.body for o in others)]
+        return Solid(manifold3d.Manifold.batch_boolean(bodies, manifold3d.OpType.Subtract))
+
+    def moved(self, matrix: Floats) -> "Solid":
+        """Carried by a 4×4 matrix, column-vector convention."""
+        return Solid(self.body.transform(np.ascontiguousarray(matrix[:3, :4])))
+
+    # ---- measured
+
+    @property
+    def volume(self) -> float:
+        """Enclosed volume."""
+        return float(self.body.volume())
+
+    @property
+    def bounds(self) -> Floats:
+        """(2, 3): lowest and highest corner of the bounding box."""
+        return np.reshape(self.body.bounding_box(), (2, 3)).astype(np.float64)
+
+    @property
+    def is_empty(self) -> bool:
+        """True where nothing is left."""
+        return bool(self.body.is_empty())
+
+    def mesh(self) -> TriMesh:
+        """The solid's surface."""
+        out = self.body.to_mesh64()
+        return TriMesh(np.asarray(out.vert_properties)[:, :3], np.asarray(out.tri_verts).astype(np.int64))
+
+    def gap(self, other: "Solid", reach: float) -> float:
+        """Least distance to another solid; `reach` where it is more."""
+        return float(self.body.min_gap(other.body, reach))
+
+    def cross_section(self, z: float) -> Sequence[Floats]:
+        """The polygons, each (n, 2), in which the plane at height z cuts the solid."""
+        return [np.asarray(p, np.float64) for p in self.body.slice(z).to_polygons()]
