@@ -13,6 +13,12 @@ from drkid.mesh import Floats, TriMesh
 CIRCLE_SEGMENTS = 48  # facets of a round shape: less than 0.01 mm off the circle at hinge radii
 
 
+def circle_outside(radius: float) -> Floats:
+    """(CIRCLE_SEGMENTS, 2): the regular polygon whose sides, four of them along the axes, touch a circle outside."""
+    angle = (np.arange(CIRCLE_SEGMENTS) + 0.5) * 2 * np.pi / CIRCLE_SEGMENTS
+    return radius / np.cos(np.pi / CIRCLE_SEGMENTS) * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
 @dataclass(frozen=True, eq=False)
 class Solid:
     """A closed solid of guaranteed manifoldness. Operations return new solids."""
@@ -30,8 +36,14 @@ class Solid:
     @classmethod
     def cylinder_along_x(cls, radius: float, low: float, high: float) -> Self:
         """A cylinder about the x axis from x = `low` to x = `high`, its facets tangent to the circle's outside."""
-        tall = manifold3d.Manifold.cylinder(high - low, radius, radius, CIRCLE_SEGMENTS)
-        return cls(tall.rotate((0.0, 90.0, 0.0)).translate((low, 0.0, 0.0)))
+        return cls.prism_along_x(circle_outside(radius), low, high)
+
+    @classmethod
+    def prism_along_x(cls, profile: ArrayLike, low: float, high: float) -> Self:
+        """The prism from x = `low` to x = `high` over the convex hull of points (n, 2) in (y, z)."""
+        points = np.asarray(profile, np.float64)
+        ends = [np.column_stack([np.full(len(points), x), points]) for x in (low, high)]
+        return cls.hull(np.vstack(ends))
 
     @classmethod
     def hull(cls, points: ArrayLike) -> Self:

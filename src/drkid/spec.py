@@ -95,6 +95,9 @@ class KitSpec(BaseModel):
         0.25, "Congruence", "How far a vertex may leave the surface, in mean edges (pressure solver).", gt=0, le=2
     )
     max_iterations: int = _field(20000, "Congruence", "Iterations after which the solver stops.", ge=1)
+    iterations_per_clustering: int = _field(
+        100, "Congruence", "Iterations from one k-means clustering to the next (pressure solver).", ge=1
+    )
     kmeans_restarts: int = _field(8, "Congruence", "Starts of k-means, of which the best is kept.", ge=1, le=1000)
     seed: int = _field(0, "Congruence", "Seed of every random choice: the same seed makes the same kit.", ge=0)
 

@@ -1,0 +1,182 @@
+"""kit.json, version 1: the document as pydantic models, from which its JSON Schema comes."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Matrix = Annotated[list[float], Field(min_length=16, max_length=16, description="4×4, row-major, column vectors")]
+Point = tuple[float, float, float]
+Face = Annotated[int, Field(ge=0, description="face of assembled.ply")]
+Vertex = Annotated[int, Field(ge=0, description="vertex of assembled.ply")]
+
+
+class Model(BaseModel):
+    """Strict about its own names, so that a misspelt field does not pass."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True, allow_inf_nan=False)
+
+
+class SourceDocument(Model):
+    """Where the surface comes from, and the scale at which it is printed."""
+
+    name: str
+    sha256: str
+    label: int | None = None
+    threshold: float | None = None
+    component: int | None = None
+    voxel_size: Point | None = Field(default=None, description="x, y, z in voxel_unit")
+    voxel_unit: str | None = None
+    scale_mm_per_unit: float = Field(gt=0)
+
+
+class SideDocument(Model):
+    """A side of a part: where its connector sits."""
+
+    connector_frame: Matrix = Field(description="from connector to part coordinates")
+
+
+class PartDocument(Model):
+    """A printed shape of a class."""
+
+    file: str
+    handedness: Literal["any", "left", "right"]
+    count: int = Field(ge=1)
+    corners: list[Point] = Field(description="in the part frame, counter-clockwise from outside")
+    sides: list[SideDocument]
+
+
+class ClassDocument(Model):
+    """A class of congruent pieces."""
+
+    id: str
+    count: int = Field(ge=1)
+    edge_lengths: list[float] = Field(description="ascending, of the printed part")
+    mirror_symmetric: bool
+    parts: list[PartDocument]
+
+
+class PieceDocument(Model):
+    """A part at its place."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True, serialize_by_alias=True)
+
+    face: Face
+    class_: Annotated[str, Field(alias="class")]
+    part: str
+    corners: tuple[Vertex, Vertex, Vertex] = Field(description="vertex of assembled.ply at each corner of the part")
+    transform: Matrix = Field(description="from part to world, proper rigid")
+
+
+class JointDocument(Model):
+    """An edge between two pieces."""
+
+    faces: tuple[Face, Face]
+    edge: tuple[Vertex, Vertex]
+    dihedral_degrees: float = Field(description="inner angle, more than 180 where concave")
+    connector: list[str] = Field(description="the half in each of `faces`, or the one key; empty for none")
+
+
+class HardwareDocument(Model):
+    """Connector parts by file, rods by diameter and length."""
+
+    file: str | None = None
+    name: str | None = None
+    diameter: float | None = None
+    length: float | None = None
+    count: int = Field(ge=1)
+
+
+class StepDocument(Model):
+    """A step of the assembly."""
+
+    step: int = Field(ge=1)
+    face: Face
+    joins: list[Face] = Field(description="every neighbour that is already placed")
+
+
+class DistanceDocument(Model):
+    """Symmetric distance of two surfaces, percent of the diagonal of surface.ply's bounding box."""
+
+    mean_percent: float = Field(ge=0)
+    max_percent: float = Field(ge=0)
+
+
+class HausdorffDocument(Model):
+    """The three pairs of surfaces."""
+
+    surface_simplified: DistanceDocument
+    simplified_assembled: DistanceDocument
+    surface_assembled: DistanceDocument
+
+
+class DihedralDocument(Model):
+    """Of |180° − inner angle|, and the share of joints above 181°."""
+
+    mean_degrees: float
+    p95_degrees: float
+    concave_percent: float
+
+
+class GrooveDocument(Model):
+    """Visible gap between pieces at their joints."""
+
+    mean_mm: float
+    max_mm: float
+
+
+class MetricsDocument(Model):
+    """What tables report."""
+
+    pieces: int
+    classes: int
+    unique_piece_parts: int = Field(description="printed shapes, mirror images apart: the number of moulds")
+    mean_edge: float
+    error_max: float
+    error_max_percent: float
+    error_mean: float
+    error_mean_percent: float
+    hausdorff: HausdorffDocument
+    dihedral: DihedralDocument
+    groove: GrooveDocument
+    genus: int
+    iterations: int
+    seconds: dict[str, float]
+
+
+class ConvergenceDocument(Model):
+    """A recorded iteration of the solver."""
+
+    iteration: int
+    energy: float
+    error_max_percent: float
+    error_mean_percent: float
+
+
+class OutcomeDocument(Model):
+    """Whether the asked tolerance was reached, and why the solver stopped."""
+
+    status: Literal["converged", "stalled"]
+    message: str
+
+
+class KitDocument(Model):
+    """A construction kit. Lengths are millimetres of the printed object, right-handed, faces counter-clockwise."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", populate_by_name=True, serialize_by_alias=True, title="drkid kit, version 1"
+    )
+
+    schema_: Literal["drkid.kit/1"] = Field(default="drkid.kit/1", alias="schema")
+    drkid_version: str
+    units: Literal["mm"] = "mm"
+    source: SourceDocument
+    spec: dict[str, Any] = Field(description="every parameter, automatic choices included; see `drkid schema spec`")
+    classes: list[ClassDocument]
+    pieces: list[PieceDocument]
+    joints: list[JointDocument]
+    hardware: list[HardwareDocument]
+    assembly: list[StepDocument]
+    metrics: MetricsDocument
+    convergence: list[ConvergenceDocument]
+    outcome: OutcomeDocument
+    notes: list[str] = Field(default=[], description="what a user should know about this kit")

@@ -1,0 +1,154 @@
+"""Kit → KitDocument and the rows of its parts list."""
+
+from collections import Counter
+from dataclasses import asdict
+
+import numpy as np
+
+from drkid import __version__
+from drkid.export import document as doc
+from drkid.export.bill_of_materials import Row, connector_row, piece_row, rod_row
+from drkid.export.layout import class_id, connector_file, part_file
+from drkid.kit import Distance, Kit, Metrics, Part
+from drkid.mesh import Floats
+
+MOST_RECORDS = 500  # of the convergence history; a plot shows no more
+
+
+def part_name(part: Part) -> str:
+    """The file of a part."""
+    return part_file(part.class_index, part.handedness)
+
+
+def connector_names(kit: Kit) -> list[str]:
+    """The files that a joint of this kit names: both halves of a hinge, one key, or none."""
+    files = [connector_file(c.name) for c in kit.part_set.connectors]
+    return files * 2 if kit.spec.connector == "hinge" and len(files) == 1 else files
+
+
+def kit_document(kit: Kit) -> doc.KitDocument:
+    """The whole of kit.json."""
+    counts = Counter(piece.part for piece in kit.assembly.pieces)
+    connectors = connector_names(kit)
+    return doc.KitDocument(
+        drkid_version=__version__,
+        source=doc.SourceDocument(**asdict(kit.source), scale_mm_per_unit=kit.part_set.scale_mm_per_unit),
+        spec=kit.spec.model_dump(mode="json"),
+        classes=_classes(kit, counts),
+        pieces=[
+            doc.PieceDocument(
+                face=piece.face,
+                class_=class_id(kit.part_set.parts[piece.part].class_index),
+                part=part_name(kit.part_set.parts[piece.part]),
+                corners=piece.vertices,
+                transform=_flat(piece.transform),
+            )
+            for piece in kit.assembly.pieces
+        ],
+        joints=[
+            doc.JointDocument(faces=j.faces, edge=j.edge, dihedral_degrees=j.dihedral_degrees, connector=connectors)
+            for j in kit.assembly.joints
+        ],
+        hardware=_hardware(kit),
+        assembly=[
+            doc.StepDocument(step=n, face=step.face, joins=list(step.joins))
+            for n, step in enumerate(kit.assembly.steps, 1)
+        ],
+        metrics=_metrics(kit.metrics),
+        convergence=_convergence(kit),
+        outcome=doc.OutcomeDocument(**asdict(kit.decomposition.outcome)),
+        notes=list(kit.notes),
+    )
+
+
+def bom_rows(kit: Kit, volumes_mm3: dict[str, float]) -> list[Row]:
+    """The parts list; `volumes_mm3` are those of the written files."""
+    counts = Counter(piece.part for piece in kit.assembly.pieces)
+    density = kit.spec.preset.density_g_cm3
+    rows = [
+        piece_row(part_name(part), part.class_index, counts[i], volumes_mm3[part_name(part)], density)
+        for i, part in enumerate(kit.part_set.parts)
+    ]
+    for item in _hardware(kit):
+        if item.file is not None:
+            rows.append(connector_row(item.name or item.file, item.file, item.count, volumes_mm3[item.file], density))
+        else:
+            rows.append(rod_row(item.diameter or 0.0, item.length or 0.0, item.count))
+    return rows
+
+
+def _classes(kit: Kit, counts: Counter[int]) -> list[doc.ClassDocument]:
+    classes: list[doc.ClassDocument] = []
+    for index, lengths in enumerate(kit.decomposition.class_lengths.tolist()):
+        numbers = [i for i, part in enumerate(kit.part_set.parts) if part.class_index == index]
+        parts = [kit.part_set.parts[i] for i in numbers]
+        classes.append(
+            doc.ClassDocument(
+                id=class_id(index),
+                count=sum(counts[i] for i in numbers),
+                edge_lengths=lengths,
+                mirror_symmetric=parts[0].handedness == "any",
+                parts=[
+                    doc.PartDocument(
+                        file=part_name(part),
+                        handedness=part.handedness,
+                        count=counts[i],
+                        corners=part.corners.tolist(),
+                        sides=[doc.SideDocument(connector_frame=_flat(frame)) for frame in part.side_frames],
+                    )
+                    for i, part in zip(numbers, parts, strict=True)
+                ],
+            )
+        )
+    return classes
+
+
+def _hardware(kit: Kit) -> list[doc.HardwareDocument]:
+    joints, dimensions = len(kit.assembly.joints), kit.part_set.dimensions
+    names = connector_names(kit)
+    items = [
+        doc.HardwareDocument(
+            name=c.name, file=connector_file(c.name), count=joints * names.count(connector_file(c.name))
+        )
+        for c in kit.part_set.connectors
+    ]
+    if kit.spec.connector == "hinge":
+        items.append(
+            doc.HardwareDocument(
+                name="rod", diameter=dimensions.rod_diameter_mm, length=dimensions.rod_length_mm, count=joints
+            )
+        )
+    return items
+
+
+def _metrics(metrics: Metrics) -> doc.MetricsDocument:
+    def distance(d: Distance) -> doc.DistanceDocument:
+        return doc.DistanceDocument(mean_percent=d.mean_percent, max_percent=d.max_percent)
+
+    plain = asdict(metrics)
+    names = set(doc.MetricsDocument.model_fields) & set(plain)
+    return doc.MetricsDocument(
+        **{name: plain[name] for name in names},
+        hausdorff=doc.HausdorffDocument(
+            surface_simplified=distance(metrics.surface_simplified),
+            simplified_assembled=distance(metrics.simplified_assembled),
+            surface_assembled=distance(metrics.surface_assembled),
+        ),
+        dihedral=doc.DihedralDocument(
+            mean_degrees=metrics.dihedral_mean_degrees,
+            p95_degrees=metrics.dihedral_p95_degrees,
+            concave_percent=metrics.concave_percent,
+        ),
+        groove=doc.GrooveDocument(mean_mm=metrics.groove_mean_mm, max_mm=metrics.groove_max_mm),
+    )
+
+
+def _convergence(kit: Kit) -> list[doc.ConvergenceDocument]:
+    """Evenly thinned, the first and the last record kept."""
+    records = kit.decomposition.convergence
+    chosen = np.unique(np.linspace(0, len(records) - 1, min(len(records), MOST_RECORDS)).round().astype(int))
+    return [doc.ConvergenceDocument(**asdict(records[i])) for i in chosen.tolist()]
+
+
+def _flat(matrix: Floats) -> list[float]:
+    return matrix.ravel().tolist()

@@ -1,0 +1,43 @@
+"""Where everything lies in a kit folder: the only place that knows a file's name."""
+
+KIT_JSON = "kit.json"
+SURFACE = "surface.ply"
+SIMPLIFIED = "simplified.ply"
+ASSEMBLED = "assembled.ply"
+PARTS = "parts"
+BOM_CSV = "bom.csv"
+BOM_JSON = "bom.json"
+PIECE_CLASS = "piece_class"  # face property of ASSEMBLED
+
+# Reserved for the documents that people hold and print.
+PLATES = "plates"
+NET_SVG, NET_PDF = "net.svg", "net.pdf"
+GUIDE_HTML, GUIDE_PDF = "guide.html", "guide.pdf"
+REPORT = "report.html"
+COUPON = "coupon.stl"
+
+
+def class_id(index: int) -> str:
+    """The letters A, B, …, Z, AA, AB, … of classes 0, 1, 2, and so on."""
+    letters = ""
+    index += 1
+    while index:
+        index, digit = divmod(index - 1, 26)
+        letters = chr(ord("A") + digit) + letters
+    return letters
+
+
+def part_file(index: int, handedness: str) -> str:
+    """File of a class's part: its letter, and its hand where mirror images differ."""
+    hand = "" if handedness == "any" else f"_{handedness}"
+    return f"{PARTS}/{class_id(index)}{hand}.stl"
+
+
+def connector_file(name: str) -> str:
+    """File of a connector part."""
+    return f"{PARTS}/{name}.stl"
+
+
+def plate_file(number: int) -> str:
+    """File of a build plate, counted from 1."""
+    return f"{PLATES}/plate_{number:02d}.3mf"

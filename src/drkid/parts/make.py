@@ -1,0 +1,169 @@
+"""The one function of this stage."""
+
+from dataclasses import dataclass
+from itertools import count
+from math import ceil, degrees
+
+import numpy as np
+
+from drkid.errors import FitError
+from drkid.kit import Connector, Decomposition, Dimensions, Part, PartSet
+from drkid.mesh import Floats, Ints, read_only
+from drkid.parts.class_triangle import LEFT_CORNERS, is_mirror_symmetric, laid_down
+from drkid.parts.dimensions import proposed
+from drkid.parts.fit import FITS_MM, Margin, margins, smallest_scale
+from drkid.parts.groove import groove_mm, recesses
+from drkid.parts.hinge import hinge_half
+from drkid.parts.key import box_key
+from drkid.parts.members import Members, members_of
+from drkid.parts.notes import notes
+from drkid.parts.pocket import pocket, side_frames
+from drkid.parts.prismoid import Prismoid
+from drkid.parts.thickening import thickened
+from drkid.progress import Progress, silent
+from drkid.spec import KitSpec
+
+MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
+FIRST_GUESS_THICKNESSES = 4.0  # mean edge of the pieces with which the search for a size begins
+WHOLE_MM = 1e-6
+
+
+def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress = silent) -> PartSet:
+    """The printed shapes of a kit: pieces with bevels and pockets, connectors, and which face uses which.
+
+    One piece a class where it is its own mirror image, a left and a right one where it is not and both are used.
+    The scale makes the longest side of the mesh's bounding box `spec.size_mm`, or is the smallest at which all
+    pockets and walls fit, rounded up to whole mm of that side. Marks are engraved later.
+
+    Raises:
+        FitError: pockets and walls do not fit at the asked size or thickness, or a piece is larger than the bed.
+    """
+    progress("laying pieces on faces", 0.0)
+    members = members_of(decomposition)
+    sharpest = degrees(float(np.abs(members.bend_radians).max())) + spec.swing_degrees
+    design = _Design(decomposition, members, proposed(spec, sharpest), spec)
+    progress("finding the size", 0.2)
+    scale = _scale(design)
+    progress("cutting parts", 0.5)
+    shapes = design.pieces(scale)
+    parts, face_part = _parts(design, shapes, scale)
+    for part in parts:
+        _require_bed(part, spec)
+    insets = np.stack([s.insets(t) for s, t in zip(shapes, design.triangles(scale), strict=True)])
+    recess = recesses(members, insets, scale, design.dimensions.thickness_mm)
+    progress("cutting parts", 1.0)
+    return PartSet(
+        scale_mm_per_unit=scale,
+        dimensions=design.dimensions,
+        parts=parts,
+        connectors=_connectors(design.dimensions, sharpest),
+        face_part=face_part,
+        face_turn=members.turn,
+        groove_mm=read_only(groove_mm(decomposition.mesh, members, recess)),
+        notes=notes(decomposition, members, design.dimensions, spec, recess, scale),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Design:
+    """All but the scale."""
+
+    decomposition: Decomposition
+    members: Members
+    dimensions: Dimensions
+    spec: KitSpec
+
+    @property
+    def longest(self) -> float:
+        """Longest side of the mesh's bounding box in its own unit."""
+        return float(self.decomposition.mesh.extents.max())
+
+    def triangles(self, scale: float) -> Floats:
+        return laid_down(self.decomposition.class_lengths * scale)
+
+    def pieces(self, scale: float) -> tuple[Prismoid, ...]:
+        return thickened(self.decomposition.class_lengths, self.members, self.dimensions, self.spec, scale)
+
+    def tightest(self, scale: float) -> tuple[int, Margin]:
+        """The class with the least slack of those in use, and where."""
+        used = np.unique(self.members.face_class)
+        triangles, pieces = self.triangles(scale), self.pieces(scale)
+        found = [(int(k), m) for k in used for m in margins(triangles[k], pieces[k], self.dimensions)]
+        return min(found, key=lambda pair: pair[1].slack_mm)
+
+    def slack_mm(self, scale: float) -> float:
+        return self.tightest(scale)[1].slack_mm
+
+    def smallest_size_mm(self) -> int:
+        """Whole mm of the longest side at which everything fits."""
+        mean_length = float(self.decomposition.class_lengths.mean())
+        guess = FIRST_GUESS_THICKNESSES * self.dimensions.thickness_mm / mean_length
+        first = ceil(smallest_scale(self.slack_mm, guess) * self.longest - WHOLE_MM)
+        return next(size for size in count(first) if self.slack_mm(size / self.longest) >= 0)
+
+
+def _scale(design: _Design) -> float:
+    size = design.spec.size_mm
+    if size is None:
+        return design.smallest_size_mm() / design.longest
+    index, margin = design.tightest(size / design.longest)
+    if margin.slack_mm < FITS_MM:
+        sides = ", ".join(f"{x:.1f}" for x in design.decomposition.class_lengths[index] * size / design.longest)
+        raise FitError(
+            f"the {margin.what} of class {index + 1} (sides {sides} mm) does not fit at size_mm {size:g}",
+            wanted=f"{margin.needed_mm:.2f} mm",
+            found=f"{margin.available_mm:.2f} mm",
+            remedy=f"a larger print (--size-mm {design.smallest_size_mm()} or more), fewer pieces (--faces), "
+            "or a thinner rod (--rod-diameter-mm)",
+        )
+    return size / design.longest
+
+
+def _parts(design: _Design, shapes: tuple[Prismoid, ...], scale: float) -> tuple[tuple[Part, ...], Ints]:
+    """The parts in use, by class, right before left, and which one each face is made from."""
+    members, parts = design.members, list[Part]()
+    face_part = np.empty(len(members.face_class), np.int64)
+    for index, triangle in enumerate(design.triangles(scale)):
+        own = members.face_class == index
+        hands = [left for left in (False, True) if (own & (members.left == left)).any()]
+        right = _right_part(design, index, triangle, shapes[index]) if hands else None
+        for left in hands:
+            face_part[own & (members.left == left)] = len(parts)
+            parts += [] if right is None else [_mirrored(right) if left else right]
+    return tuple(parts), read_only(face_part)
+
+
+def _right_part(design: _Design, index: int, triangle: Floats, shape: Prismoid) -> Part:
+    frames = side_frames(triangle)
+    solid = shape.solid
+    if design.dimensions.connector != "none":
+        solid = solid.minus_all([pocket(design.dimensions).moved(frame) for frame in frames])
+    symmetric = is_mirror_symmetric(design.decomposition.class_lengths[index])
+    return Part(index, "any" if symmetric else "right", _flat(triangle), frames, solid)
+
+
+def _mirrored(right: Part) -> Part:
+    """The left part of a class: the mirror image of the right one, first side along x again."""
+    triangle = (right.corners[:, :2] * [-1, 1])[list(LEFT_CORNERS)]
+    return Part(right.class_index, "left", _flat(triangle), side_frames(triangle), right.solid.moved(MIRROR))
+
+
+def _flat(triangle: Floats) -> Floats:
+    return read_only(np.column_stack([triangle, np.zeros(3)]))
+
+
+def _connectors(dimensions: Dimensions, sharpest_degrees: float) -> tuple[Connector, ...]:
+    if dimensions.connector == "hinge":
+        return (hinge_half(dimensions, sharpest_degrees),)
+    return (box_key(dimensions),) if dimensions.connector == "box" else ()
+
+
+def _require_bed(part: Part, spec: KitSpec) -> None:
+    size = np.sort(np.ptp(part.solid.bounds, axis=0))
+    if (size > np.sort(spec.bed_mm)).any():
+        raise FitError(
+            f"a piece of class {part.class_index + 1} is larger than the printer's bed",
+            wanted=" × ".join(f"{x:g}" for x in spec.bed_mm) + " mm at most",
+            found=" × ".join(f"{x:.1f}" for x in size) + " mm",
+            remedy="a smaller print (--size-mm), more pieces (--faces), or a larger bed (--bed-mm)",
+        )

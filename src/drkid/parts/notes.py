@@ -1,0 +1,91 @@
+"""What a user should know about the parts, in sentences."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from drkid.kit import Decomposition, Dimensions
+from drkid.mesh import Floats
+from drkid.parts.bevel import SHARPEST_JOINT_DEGREES, demanded
+from drkid.parts.groove import touching_mm
+from drkid.parts.key import largest_bend_degrees
+from drkid.parts.members import Members
+from drkid.spec import KitSpec
+
+TOUCH_MM = 1e-3  # pieces that reach into one another by less are drawn apart by any process
+
+
+def notes(
+    decomposition: Decomposition,
+    members: Members,
+    dimensions: Dimensions,
+    spec: KitSpec,
+    recess_mm: Floats,
+    scale: float,
+) -> tuple[str, ...]:
+    """The sentences, most general first; `recess_mm` (F, 2, 3) as `groove.recesses` gives it."""
+    touching = touching_mm(decomposition.mesh, members, recess_mm, scale)
+    return (
+        *_connector_notes(members, dimensions),
+        *_touching_notes(touching, spec),
+        *_short_notes(members, dimensions, spec, recess_mm, scale),
+        *_limit_notes(members, dimensions, spec),
+    )
+
+
+def _connector_notes(members: Members, dimensions: Dimensions) -> Iterator[str]:
+    if dimensions.connector == "none":
+        return
+    what = "the finished hinge is pressed in" if dimensions.connector == "hinge" else "the key is pressed in"
+    yield f"Pockets are open to the inner face: {what} from inside; only the fit holds it, so glue it if it falls out."
+    if dimensions.connector == "box":
+        bend, limit = np.degrees(members.bend_radians), largest_bend_degrees(dimensions)
+        beyond = int((bend > limit).sum()) // 2
+        yield (
+            f"The keys are straight: they follow bends up to {limit:.1f}°; {beyond} joints bend more, "
+            f"the sharpest by {np.abs(bend).max():.1f}°."
+        )
+
+
+def _touching_notes(touching_mm: Floats, spec: KitSpec) -> Iterator[str]:
+    count = int((touching_mm > TOUCH_MM).sum())
+    if count:
+        yield (
+            f"Pieces reach into one another at {count} of {len(touching_mm)} joints, by up to "
+            f"{touching_mm.max():.2f} mm (thickening: {spec.thickening})."
+        )
+
+
+def _short_notes(
+    members: Members, dimensions: Dimensions, spec: KitSpec, recess_mm: Floats, scale: float
+) -> Iterator[str]:
+    """Sides whose bevel was cut down to keep the connector's hold, class by class."""
+    if spec.thickening != "bisector":
+        return
+    rest = demanded(members, scale, dimensions.thickness_mm, 0.0)
+    swung = demanded(members, scale, dimensions.thickness_mm, spec.swing_degrees)
+    slack = scale * (members.far - members.near)[:, None, :]
+    missing = (swung - rest - (recess_mm - slack)).max(axis=1)
+    for index in np.unique(members.face_class):
+        own = missing[members.face_class == index]
+        for side in np.flatnonzero((own > TOUCH_MM).any(axis=0)):
+            yield (
+                f"Class {index + 1}, side {side + 1}: its bevel stops short of what every joint asks, or the connector "
+                f"would have no hold; {int((own[:, side] > TOUCH_MM).sum())} sides lack up to "
+                f"{own[:, side].max():.2f} mm and touch or cannot swing by {spec.swing_degrees:g}°."
+            )
+
+
+def _limit_notes(members: Members, dimensions: Dimensions, spec: KitSpec) -> Iterator[str]:
+    sharp = np.degrees(np.abs(members.bend_radians)) + spec.swing_degrees > SHARPEST_JOINT_DEGREES
+    if sharp.any():
+        yield (
+            f"{int(sharp.sum()) // 2} joints bend by more than {SHARPEST_JOINT_DEGREES - spec.swing_degrees:g}°: "
+            "what they join touches."
+        )
+    thickest = spec.preset.max_wall_mm
+    if thickest is not None and dimensions.thickness_mm > thickest:
+        yield (
+            f"Pieces are {dimensions.thickness_mm:g} mm thick; {spec.process} moulding wants walls of {thickest:g} mm "
+            "at most: core them out from the inner face."
+        )

@@ -1,0 +1,134 @@
+"""The one page that calls the stages in order: `make_kit(source, spec) -> Kit`."""
+
+import time
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+from drkid.assembly import assemble
+from drkid.congruence import decompose
+from drkid.data import nucleus_path
+from drkid.export import write_kit
+from drkid.formats import is_mesh_path
+from drkid.intersection import self_intersections
+from drkid.kit import Decomposition, Kit, PartSet, Surface
+from drkid.metrics import measure_kit
+from drkid.parts import make_parts
+from drkid.progress import Progress, silent
+from drkid.remesh import simplify
+from drkid.spec import DEFAULT_FACES, KitSpec
+from drkid.surface import extract_surface
+from drkid.volume import read_volume
+
+StageProgress = Callable[[str, str, float], None]
+"""Called with the stage, what it is doing, and the fraction of the stage that is done."""
+
+STAGES = ("surface", "remesh", "congruence", "parts", "assembly", "measure")
+
+
+def nobody(_stage: str, _what: str, _fraction: float) -> None:
+    """Tell nobody."""
+
+
+def make_kit(source: str | Path | None = None, spec: KitSpec | None = None, progress: StageProgress = nobody) -> Kit:
+    """Make a construction kit from a segmented volume or a mesh.
+
+    Args:
+        source: file of a volume (.mrc, .nii, .tif, .nrrd, .npy, …) or a closed mesh (.stl, .ply, .obj, …); the
+            bundled cell nucleus where None.
+        spec: all parameters; the defaults where None.
+        progress: told how far each stage is.
+
+    Returns:
+        The kit, every length in millimetres of the printed object; `kit.write(folder)` writes it.
+
+    Raises:
+        DrkidError: a file that cannot be used, or parameters that cannot be met; says what to try.
+    """
+    spec = KitSpec() if spec is None else spec
+    seconds: dict[str, float] = {}
+
+    @contextmanager
+    def stage(name: str) -> Generator[Progress]:
+        start = time.perf_counter()
+        progress(name, "", 0.0)
+        yield lambda what, fraction: progress(name, what, fraction)
+        seconds[name] = time.perf_counter() - start
+        progress(name, "", 1.0)
+
+    with stage("surface") as told:
+        surface = read_surface(source, spec, told)
+    with stage("remesh") as told:
+        simplified = simplify(surface, spec, told)
+    with stage("congruence") as told:
+        decomposition = decompose(simplified.mesh, spec, told)
+    with stage("parts") as told:
+        part_set = make_parts(decomposition, spec, told)
+    scale = part_set.scale_mm_per_unit
+    printed = _scaled(decomposition, scale)
+    with stage("assembly") as told:
+        assembly = assemble(printed.mesh, part_set, told)
+    with stage("measure"):
+        surfaces = surface.mesh.scaled(scale), simplified.mesh.scaled(scale)
+        metrics = measure_kit(*surfaces, printed, part_set, {})
+    return Kit(
+        spec=_resolved(spec, surface, printed, part_set),
+        source=surface.source,
+        surface=surfaces[0],
+        simplified=surfaces[1],
+        decomposition=printed,
+        part_set=part_set,
+        assembly=assembly,
+        metrics=replace(metrics, seconds=seconds),
+        notes=(*surface.notes, *simplified.notes, *printed.notes, *part_set.notes, *_crossings(printed)),
+        writer=write_kit,
+    )
+
+
+def read_surface(source: str | Path | None, spec: KitSpec, progress: Progress = silent) -> Surface:
+    """M_i of a file, or of the bundled nucleus: the first stages of `make_kit` alone.
+
+    Raises:
+        DrkidError: the file cannot be used.
+    """
+    path = nucleus_path() if source is None else Path(source)
+    return extract_surface(path if is_mesh_path(path) else read_volume(path, spec), spec, progress)
+
+
+def _scaled(decomposition: Decomposition, scale: float) -> Decomposition:
+    """In millimetres of the printed object."""
+    return replace(
+        decomposition,
+        mesh=decomposition.mesh.scaled(scale),
+        class_lengths=decomposition.class_lengths * scale,
+        face_errors=decomposition.face_errors * scale,
+    )
+
+
+def _crossings(decomposition: Decomposition) -> tuple[str, ...]:
+    count = len(self_intersections(decomposition.mesh))
+    return (f"{count} pairs of faces of the assembled surface cut each other: take more faces",) if count else ()
+
+
+def _resolved(spec: KitSpec, surface: Surface, printed: Decomposition, part_set: PartSet) -> KitSpec:
+    """The spec with every automatic choice filled in, so that the same kit can be made from it again."""
+    source, dimensions = surface.source, part_set.dimensions
+    return spec.model_copy(
+        update={
+            "label": source.label,
+            "threshold": source.threshold,
+            "component": source.component,
+            "spacing": source.voxel_size,
+            "unit": source.voxel_unit,
+            "faces": None if spec.vertices is not None else spec.faces or DEFAULT_FACES,
+            "size_mm": float(printed.mesh.extents.max()),
+            "thickness_mm": dimensions.thickness_mm,
+            "clearance_mm": dimensions.clearance_mm,
+            "rod_clearance_mm": dimensions.rod_clearance_mm,
+            "rod_diameter_mm": dimensions.rod_diameter_mm or None,
+            "min_wall_mm": dimensions.min_wall_mm,
+            "knuckle_wall_mm": dimensions.knuckle_wall_mm,
+            "mark_depth_mm": spec.preset.mark_depth_mm if spec.mark_depth_mm is None else spec.mark_depth_mm,
+        }
+    )

@@ -1,0 +1,41 @@
+"""What tests share: the folder of real shapes, and small closed meshes that are made, not loaded."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import settings
+
+from drkid.mesh import TriMesh
+
+settings.register_profile("drkid", deadline=None, derandomize=True)  # the first call may compile
+settings.load_profile("drkid")
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """The real volumes and meshes that the repository may not hold; skips where they are not."""
+    folder = Path(os.environ.get("DRKID_DATA", REPOSITORY.parent / "shared" / "data"))
+    if not folder.is_dir():
+        pytest.skip(f"no real shapes at {folder}: set DRKID_DATA to their folder")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def potato() -> TriMesh:
+    """A smooth closed surface of 320 faces, genus 0, neither round nor symmetric."""
+    sphere = trimesh.creation.icosphere(subdivisions=2)
+    x, y, z = np.asarray(sphere.vertices).T
+    radius = 1 + 0.15 * np.sin(2 * x + 1) + 0.1 * np.cos(3 * y * z) + 0.08 * x * z
+    return TriMesh(np.stack([1.4 * x, y, 0.9 * z], axis=1) * radius[:, None], np.asarray(sphere.faces))
+
+
+@pytest.fixture(scope="session")
+def ring() -> TriMesh:
+    """A torus: genus 1."""
+    torus = trimesh.creation.torus(2.0, 0.8, major_sections=24, minor_sections=12)
+    return TriMesh(np.asarray(torus.vertices), np.asarray(torus.faces))

@@ -1,0 +1,226 @@
+import numpy as np
+import pytest
+from exact_shapes import decomposed, geodesic, icosahedron, potato, sixths, tetrahedron
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drkid.errors import FitError
+from drkid.kit import Decomposition, PartSet
+from drkid.measure import bend_radians
+from drkid.mesh import TriMesh
+from drkid.parts import make_parts
+from drkid.parts.pocket import pocket
+from drkid.spec import PROCESSES, KitSpec
+
+KITS = {"icosahedron": icosahedron(), "geodesic": geodesic(), "sixths": sixths()}
+
+
+def made(mesh: TriMesh, classes: int | None = None, **spec: object) -> PartSet:
+    return make_parts(decomposed(mesh, classes), KitSpec(**spec))
+
+
+def side_lengths(corners) -> np.ndarray:
+    return np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
+
+
+@pytest.fixture(scope="module", params=KITS)
+def kit(request) -> tuple[Decomposition, PartSet]:
+    d = decomposed(KITS[request.param])
+    return d, make_parts(d, KitSpec())
+
+
+def test_parts_have_the_lengths_of_their_class_and_fit_their_faces(kit) -> None:
+    d, parts = kit
+    for part in parts.parts:
+        lengths = d.class_lengths[part.class_index] * parts.scale_mm_per_unit
+        assert np.sort(side_lengths(part.corners)) == pytest.approx(lengths)
+        assert part.corners.mean(axis=0) == pytest.approx(np.zeros(3), abs=1e-9)
+        order = side_lengths(part.corners)
+        assert order[0] == pytest.approx(lengths[0])
+        if part.handedness != "any":
+            assert (order[1] < order[2]) == (part.handedness == "right")
+    turned = (np.arange(3) + parts.face_turn[:, None]) % 3
+    of_faces = np.take_along_axis(d.mesh.side_lengths, turned, 1) * parts.scale_mm_per_unit
+    of_parts = np.array([side_lengths(parts.parts[p].corners) for p in parts.face_part])
+    assert of_faces == pytest.approx(of_parts, abs=1e-4)
+
+
+def test_pieces_are_solid_and_as_thick_as_stated(kit) -> None:
+    _, parts = kit
+    for part in parts.parts:
+        mesh = part.solid.mesh()
+        assert mesh.is_closed_manifold
+        assert mesh.component_count == 1
+        assert mesh.volume > 0
+        half = parts.dimensions.thickness_mm / 2
+        assert part.solid.bounds[:, 2] == pytest.approx([-half, half])
+
+
+def test_all_pockets_hold_the_connector_alike_with_the_clearance(kit) -> None:
+    _, parts = kit
+    half = parts.connectors[0].solid
+    for part in parts.parts:
+        for frame in part.side_frames:
+            held = half.moved(frame)
+            assert (held & part.solid).volume < 1e-9
+            assert part.solid.gap(held, 1.0) == pytest.approx(parts.dimensions.clearance_mm, abs=1e-6)
+            assert (pocket(parts.dimensions).moved(frame) & part.solid).volume < 1e-9
+
+
+def test_left_is_the_mirror_image_of_right() -> None:
+    right, left = made(sixths()).parts
+    assert (right.handedness, left.handedness) == ("right", "left")
+    mirrored = right.solid.moved(np.diag([-1.0, 1, 1, 1]))
+    assert (mirrored & left.solid).volume == pytest.approx(left.solid.volume)
+    assert left.solid.volume == pytest.approx(right.solid.volume)
+
+
+@pytest.mark.parametrize("thickening", ["bisector", "mean_normal", "perpendicular"])
+def test_symmetric_pieces_are_their_own_mirror_image(thickening) -> None:
+    for part in made(geodesic(), thickening=thickening).parts:
+        assert part.handedness == "any"
+        lengths = side_lengths(part.corners)
+        odd = int(np.argmax(np.abs(lengths - np.median(lengths))))  # the base of the isosceles piece
+        x, y = np.roll(part.corners, -1, axis=0)[odd, :2] - part.corners[odd, :2]
+        mirror = np.eye(4)
+        mirror[:2, :2] = np.eye(2) - 2 * np.outer([x, y], [x, y]) / (x * x + y * y)
+        assert (part.solid & part.solid.moved(mirror)).volume == pytest.approx(part.solid.volume, rel=1e-5)
+
+
+def test_a_kit_without_left_faces_has_no_left_part() -> None:
+    d = decomposed(sixths())
+    parts = make_parts(d, KitSpec())
+    assert np.bincount(parts.face_part).tolist() == [24, 24]
+    # one class for the right-handed faces alone, one for the left-handed ones
+    own = parts.face_part.copy()
+    apart = Decomposition(d.mesh, own, np.repeat(d.class_lengths, 2, axis=0), d.face_errors, 0, (), d.outcome)
+    assert [(p.class_index, p.handedness) for p in make_parts(apart, KitSpec()).parts] == [(0, "right"), (1, "left")]
+
+
+@pytest.mark.parametrize("process", PROCESSES)
+@pytest.mark.parametrize("connector", ["hinge", "box", "none"])
+def test_every_process_and_connector_makes_a_kit_that_fits(process, connector) -> None:
+    parts = made(geodesic(), process=process, connector=connector)
+    size = parts.scale_mm_per_unit * geodesic().extents.max()
+    assert size == pytest.approx(round(size))
+    assert [c.name for c in parts.connectors] == {"hinge": ["connector_half"], "box": ["connector_key"], "none": []}[
+        connector
+    ]
+    assert all(p.solid.mesh().is_closed_manifold for p in parts.parts)
+    if connector != "none":
+        with pytest.raises(FitError):
+            made(geodesic(), process=process, connector=connector, size_mm=round(size) - 2.0)
+
+
+# published smallest mean edge of a flat equilateral piece per process, mm; a bevelled one needs a little more
+SMALLEST_EDGE = {"fdm": 31.6, "sla": 22.9, "polyjet": 22.9, "injection": 22.3}
+
+
+@pytest.mark.parametrize("process", PROCESSES)
+def test_smallest_size_is_close_to_the_published_one(process) -> None:
+    mesh = icosahedron()
+    edge = made(mesh, process=process).scale_mm_per_unit * mesh.mean_edge
+    assert SMALLEST_EDGE[process] - 0.5 < edge < SMALLEST_EDGE[process] + 1.5
+
+
+def test_too_small_is_refused_with_class_numbers_and_remedies() -> None:
+    smallest = made(geodesic()).scale_mm_per_unit * geodesic().extents.max()
+    with pytest.raises(FitError) as caught:
+        made(geodesic(), size_mm=70)
+    error = caught.value
+    assert "class 1" in error.problem or "class 2" in error.problem
+    assert "wall between two pockets" in error.problem
+    assert error.wanted == "1.20 mm"
+    assert float(error.found.split()[0]) < 1.2
+    assert f"--size-mm {smallest:.0f}" in error.remedy
+    assert "fewer pieces" in error.remedy
+    assert "thinner rod" in error.remedy
+
+
+def test_a_proposed_size_fits_when_it_is_given() -> None:
+    proposed = made(geodesic())
+    size = float(geodesic().scaled(proposed.scale_mm_per_unit).extents.max())
+    again = made(geodesic(), size_mm=size, thickness_mm=proposed.dimensions.thickness_mm)
+    assert again.scale_mm_per_unit == pytest.approx(proposed.scale_mm_per_unit)
+    assert again.dimensions == proposed.dimensions
+
+
+def test_a_piece_larger_than_the_bed_is_refused() -> None:
+    with pytest.raises(FitError, match="larger than the printer's bed") as caught:
+        made(icosahedron(), size_mm=500)
+    assert "220" in caught.value.wanted
+
+
+def test_scale_of_the_source_does_not_matter_at_a_fixed_size() -> None:
+    one, other = made(geodesic(), size_mm=150), made(geodesic().scaled(1e-3), size_mm=150)
+    assert other.scale_mm_per_unit == pytest.approx(1e3 * one.scale_mm_per_unit)
+    assert other.groove_mm == pytest.approx(one.groove_mm, abs=1e-6)
+    for a, b in zip(one.parts, other.parts, strict=True):
+        assert b.corners == pytest.approx(a.corners, abs=1e-6)
+        assert b.solid.volume == pytest.approx(a.solid.volume)
+
+
+@settings(max_examples=5, deadline=None)
+@given(st.integers(0, 1000))
+def test_relabelled_faces_are_made_from_the_same_parts(seed) -> None:
+    d = decomposed(sixths())
+    order = np.random.default_rng(seed).permutation(len(d.face_class))
+    mesh = TriMesh(d.mesh.vertices, d.mesh.faces[order])
+    again = Decomposition(mesh, d.face_class[order], d.class_lengths, d.face_errors[order], 0, (), d.outcome)
+    one, other = make_parts(d, KitSpec()), make_parts(again, KitSpec())
+    assert (other.face_part == one.face_part[order]).all()
+    assert (other.face_turn == one.face_turn[order]).all()
+    assert [p.solid.volume for p in other.parts] == pytest.approx([p.solid.volume for p in one.parts])
+
+
+def test_unlike_faces_make_left_and_right_parts_and_larger_grooves() -> None:
+    exact, rough = made(potato(3), 80, size_mm=200), made(potato(3), 5, size_mm=200)
+    assert len(exact.parts) == 80
+    assert len(rough.parts) == 10
+    assert rough.groove_mm.mean() > 2 * exact.groove_mm.mean()
+
+
+def test_notes_tell_how_pockets_are_used() -> None:
+    assert "pressed in from inside" in made(icosahedron()).notes[0]
+    assert made(icosahedron(), connector="none").notes == ()
+
+
+def test_notes_tell_the_bend_that_a_key_does_not_follow() -> None:
+    note = made(icosahedron(), connector="box").notes[1]
+    assert "30 joints bend more" in note
+    assert "41.8°" in note
+
+
+def test_notes_count_the_joints_that_touch() -> None:
+    notes = " ".join(made(icosahedron(), thickening="perpendicular").notes)
+    assert "30 of 30 joints" in notes
+    assert "reach into one another" not in " ".join(made(icosahedron()).notes)
+
+
+def test_notes_tell_which_sides_lack_their_bevel() -> None:
+    parts = made(tetrahedron())
+    text = " ".join(parts.notes)
+    assert "Class 1, side 1" in text
+    assert "4 sides lack" in text
+    # at rest nothing touches: what is missing is the swing
+    assert "reach into one another" not in text
+
+
+def test_notes_tell_of_joints_sharper_than_any_hinge() -> None:
+    flat = tetrahedron()
+    mesh = flat.moved(flat.vertices * [1, 1, 0.25])
+    text = " ".join(make_parts(decomposed(mesh), KitSpec(connector="none")).notes)
+    sharp = (np.abs(np.degrees(bend_radians(mesh))) > 140 - 5.5).sum()
+    assert 0 < sharp < 6
+    assert f"{sharp} joints bend by more than 134.5°" in text
+
+
+def test_notes_warn_of_walls_too_thick_to_mould() -> None:
+    assert "core them out" in made(icosahedron(), process="injection").notes[-1]
+
+
+def test_progress_runs_from_nothing_to_all() -> None:
+    told: list[float] = []
+    make_parts(decomposed(icosahedron()), KitSpec(), lambda _, fraction: told.append(fraction))
+    assert told == sorted(told)
+    assert (told[0], told[-1]) == (0.0, 1.0)
