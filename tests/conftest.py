@@ -8,7 +8,10 @@ import pytest
 import trimesh
 from hypothesis import settings
 
+from drkid.kit import Kit
 from drkid.mesh import TriMesh
+from drkid.pipeline import make_kit
+from drkid.spec import KitSpec
 
 settings.register_profile("drkid", deadline=None, derandomize=True)  # the first call may compile
 settings.load_profile("drkid")
@@ -39,3 +42,23 @@ def ring() -> TriMesh:
     """A torus: genus 1."""
     torus = trimesh.creation.torus(2.0, 0.8, major_sections=24, minor_sections=12)
     return TriMesh(np.asarray(torus.vertices), np.asarray(torus.faces))
+
+
+@pytest.fixture(scope="session")
+def potato_file(potato, tmp_path_factory) -> Path:
+    """The potato as a mesh file."""
+    path = tmp_path_factory.mktemp("input") / "potato.stl"
+    trimesh.Trimesh(potato.vertices, potato.faces, process=False).export(path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def kit(potato_file) -> Kit:
+    """A small kit of the potato: 60 pieces in four classes."""
+    return make_kit(potato_file, KitSpec(faces=60, classes=4, tolerance_percent=5, max_iterations=4000))
+
+
+@pytest.fixture(scope="session")
+def kit_folder(kit, tmp_path_factory) -> Path:
+    """That kit as written. Tests that change it take a copy."""
+    return kit.write(tmp_path_factory.mktemp("kits") / "potato")

@@ -277,8 +277,10 @@ def _thickness(mesh: TriMesh, voxel: float | None) -> Thickness | None:
     """
     tree: Any = igl.AABB()
     tree.init(np.array(mesh.vertices), np.array(mesh.faces))
-    start = mesh.corners.mean(axis=1) - mesh.face_normals * (LIFT_DIAGONALS * mesh.diagonal)
-    hit, distance, _ = tree.intersect_ray_first(mesh.vertices, mesh.faces, start, -mesh.face_normals)
+    lift = LIFT_DIAGONALS * mesh.diagonal
+    start = mesh.corners.mean(axis=1) - lift * mesh.face_normals
+    hit, beyond, _ = tree.intersect_ray_first(mesh.vertices, mesh.faces, start, -mesh.face_normals)
+    distance = np.asarray(beyond) + lift
     facing = np.einsum("ij,ij->i", mesh.face_normals, mesh.face_normals[hit]) < FACING_COSINE
     walls = np.flatnonzero((hit >= 0) & facing)
     if not walls.size:

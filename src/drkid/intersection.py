@@ -211,11 +211,11 @@ def self_intersections(mesh: TriMesh) -> Ints:
     Touching counts; so do neighbours folded flat on top of one another, and a face given twice. Exact as long as no
     product of three coordinates over- or underflows. Faces without area are taken as the segments that they are.
     """
+    if not len(mesh.faces):
+        return read_only(np.empty((0, 2), np.int64))
     low, high = mesh.corners.min(axis=1), mesh.corners.max(axis=1)
     turned = np.argsort(-mesh.extents)  # the sweep goes along the longest side of the bounding box
     order = np.argsort(low[:, turned[0]], kind="stable")
-    if not len(mesh.faces):
-        return read_only(np.empty((0, 2), np.int64))
     pairs = _cutting_pairs(
         mesh.vertices, mesh.faces, np.ascontiguousarray(low[:, turned]), np.ascontiguousarray(high[:, turned]), order
     )

@@ -17,6 +17,16 @@ Handedness = Literal["any", "left", "right"]
 Status = Literal["converged", "stalled"]
 
 
+def class_id(index: int) -> str:
+    """The letters A, B, …, Z, AA, AB, … of classes 0, 1, 2, and so on."""
+    letters = ""
+    index += 1
+    while index:
+        index, digit = divmod(index - 1, 26)
+        letters = chr(ord("A") + digit) + letters
+    return letters
+
+
 @dataclass(frozen=True)
 class Source:
     """Where a surface comes from: enough to find and cut out the same object again.

@@ -180,10 +180,12 @@ class KitSpec(BaseModel):
 
 def _reworded(error: ValidationError) -> SpecError:
     first = error.errors(include_url=False)[0]
-    name = ".".join(str(part) for part in first["loc"]) or "the parameters"
-    field = KitSpec.model_fields.get(str(first["loc"][0])) if first["loc"] else None
     message = first["msg"].removeprefix("Value error, ")
-    found = "" if isinstance(first["input"], dict | KitSpec) else repr(first["input"])
+    if not first["loc"]:
+        return SpecError(message, remedy="drkid make --help")
+    name = ".".join(str(part) for part in first["loc"])
+    field = KitSpec.model_fields.get(str(first["loc"][0]))
+    found = repr(first["input"])
     if first["type"] == "extra_forbidden":
         return SpecError(f"there is no parameter {name}", remedy="drkid make --help")
     remedy = f"{name}: {field.description}" if field is not None and field.description else "drkid make --help"

@@ -116,7 +116,7 @@ def _broken(path: Path, wanted: str, found: str) -> KitFolderError:
 
 
 def _agree(name: str, stated: float, found: float, absolute: float = 1e-9) -> Check:
-    near = abs(stated - found) <= max(absolute, RELATIVE * abs(found))
+    near = bool(abs(stated - found) <= max(absolute, RELATIVE * abs(found)))
     return Check(name, near, f"stated {stated:.6g}, recomputed {found:.6g}")
 
 
@@ -172,7 +172,7 @@ def _angles(mesh: TriMesh, kit: KitDocument) -> list[Check]:
     complete = set(named) == set(edges) and len(kit.joints) == len(edges)
     off = max((abs(angle - inner[edges[edge]]) for edge, angle in named.items() if edge in edges), default=np.inf)
     return [
-        Check("joints", complete and off < 1e-6, f"{len(kit.joints)} for {len(edges)} edges, off by {off:.2g}°"),
+        Check("joints", complete and bool(off < 1e-6), f"{len(kit.joints)} for {len(edges)} edges, off by {off:.2g}°"),
         _agree("dihedral mean, °", stated.mean_degrees, found.mean_degrees, 1e-6),
         _agree("dihedral p95, °", stated.p95_degrees, found.p95_degrees, 1e-6),
         _agree("concave, %", stated.concave_percent, found.concave_percent, 1e-6),

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
-from exact_shapes import decomposed, geodesic, icosahedron, sixths
+from exact_shapes import decomposed, geodesic, icosahedron, potato, sixths
 
+from drkid.kit import Decomposition
 from drkid.parts.class_triangle import laid_down, symmetries
 from drkid.parts.mean_normal import leaning, mean_normal_slopes
 from drkid.parts.members import members_of
@@ -22,6 +23,18 @@ def test_slopes_have_the_symmetries_of_the_class(mesh) -> None:
     for row, lengths in zip(slopes, d.class_lengths, strict=True):
         for image, matrix in symmetries(lengths):
             assert row @ matrix.T == pytest.approx(row[list(image)], abs=1e-5)
+
+
+@pytest.mark.parametrize("ratio", [(1, 1, 1), (1, 1, 1.2), (1, 1.2, 1.2)])
+def test_symmetric_classes_stay_so_among_unlike_members(ratio) -> None:
+    d = decomposed(potato(), 1)
+    lengths = d.mesh.mean_edge * np.array([ratio], float)
+    members = members_of(Decomposition(d.mesh, d.face_class, lengths, d.face_errors, 0, (), d.outcome))
+    slopes = mean_normal_slopes(members, lengths)[0]
+    assert not members.left.any()
+    assert np.abs(slopes).max() > 0.05
+    for image, matrix in symmetries(lengths[0]):
+        assert slopes @ matrix.T == pytest.approx(slopes[list(image)], abs=1e-9)
 
 
 def test_leaning_piece_is_half_way_at_the_class_triangle_and_obeys_its_limit() -> None:

@@ -7,15 +7,18 @@ from drkid.congruence.solver import Solution, run
 from drkid.congruence.triangle_space import ascending_lengths, class_means
 from drkid.errors import SpecError
 from drkid.kit import Decomposition
-from drkid.mesh import TriMesh, read_only
+from drkid.mesh import Floats, TriMesh, read_only
 from drkid.progress import Progress, silent
 from drkid.spec import KitSpec
+
+ISOSCELES_PERCENT = 0.1  # of the mean edge: below it no process prints two sides as different
 
 
 def decompose(mesh: TriMesh, spec: KitSpec, progress: Progress = silent) -> Decomposition:
     """Decompose a closed mesh M_s into `spec.classes` classes of alike triangles (the paper, algorithm 1).
 
-    Classes come out without empty ones, ordered by their edge lengths, and their lengths are their members' means.
+    Classes come out without empty ones, ordered by their edge lengths, and their lengths are their
+    members' means; two lengths nearer than `ISOSCELES_PERCENT` are made equal, unless the tolerance would break.
 
     Raises:
         SpecError: more classes than faces, or a solver that this version does not have.
@@ -35,24 +38,39 @@ def decompose(mesh: TriMesh, spec: KitSpec, progress: Progress = silent) -> Deco
             remedy="--method pressure",
         )
     solution = run(PressureSolver(spec), mesh, progress)
-    return _tidied(solution)
+    return _tidied(solution, spec.tolerance_percent)
 
 
-def _tidied(solution: Solution) -> Decomposition:
+def _tidied(solution: Solution, tolerance_percent: float) -> Decomposition:
     best = solution.best
     points = ascending_lengths(best.mesh)
     used, labels = np.unique(best.face_class, return_inverse=True)
     means = class_means(points, labels.ravel(), len(used))
     order = np.lexsort(means.T[::-1])  # by the shortest side, then the middle one
-    rank = np.argsort(order)
-    face_class = rank[labels.ravel()].astype(np.int64)
-    lengths = means[order]
+    face_class = np.argsort(order)[labels.ravel()].astype(np.int64)
+    lengths = _isosceles(means[order], best.mesh.mean_edge)
+    errors = np.linalg.norm(points - lengths[face_class], axis=1)
+    if 100 * errors.max() / best.mesh.mean_edge > tolerance_percent and solution.outcome.status == "converged":
+        lengths = means[order]
+        errors = np.linalg.norm(points - lengths[face_class], axis=1)
     return Decomposition(
         mesh=best.mesh,
         face_class=read_only(face_class),
         class_lengths=read_only(lengths),
-        face_errors=read_only(np.linalg.norm(points - lengths[face_class], axis=1)),
+        face_errors=read_only(errors),
         iterations=solution.iterations,
         convergence=solution.convergence,
         outcome=solution.outcome,
     )
+
+
+def _isosceles(lengths: Floats, mean_edge: float) -> Floats:
+    """Class lengths (k, 3) in which two sides that nearly agree are equal: one mould then serves both hands."""
+    snapped = lengths.copy()
+    close = np.diff(lengths, axis=1) <= ISOSCELES_PERCENT / 100 * mean_edge
+    for first in range(2):
+        rows = close[:, first]
+        snapped[rows, first : first + 2] = snapped[rows, first : first + 2].mean(axis=1, keepdims=True)
+    rows = close.all(axis=1)
+    snapped[rows] = lengths[rows].mean(axis=1, keepdims=True)
+    return snapped

@@ -6,7 +6,7 @@ import json
 from dataclasses import asdict, dataclass, fields
 
 from drkid.export.colour import CONNECTOR_COLOUR, class_colour
-from drkid.export.layout import class_id
+from drkid.kit import class_id
 
 
 @dataclass(frozen=True)

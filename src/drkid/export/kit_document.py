@@ -2,14 +2,15 @@
 
 from collections import Counter
 from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 
 from drkid import __version__
 from drkid.export import document as doc
 from drkid.export.bill_of_materials import Row, connector_row, piece_row, rod_row
-from drkid.export.layout import class_id, connector_file, part_file
-from drkid.kit import Distance, Kit, Metrics, Part
+from drkid.export.layout import connector_file, part_file
+from drkid.kit import Distance, Kit, Metrics, Part, class_id
 from drkid.mesh import Floats
 
 MOST_RECORDS = 500  # of the convergence history; a plot shows no more
@@ -59,6 +60,12 @@ def kit_document(kit: Kit) -> doc.KitDocument:
         outcome=doc.OutcomeDocument(**asdict(kit.decomposition.outcome)),
         notes=list(kit.notes),
     )
+
+
+def kit_summary(kit: Kit) -> dict[str, Any]:
+    """What `make --json` prints of a kit: source, parameters, metrics, outcome and notes, as in kit.json."""
+    document = kit_document(kit).model_dump(mode="json", by_alias=True, exclude_none=True)
+    return {name: document[name] for name in ("source", "spec", "metrics", "outcome", "notes")}
 
 
 def bom_rows(kit: Kit, volumes_mm3: dict[str, float]) -> list[Row]:

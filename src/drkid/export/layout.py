@@ -1,5 +1,7 @@
 """Where everything lies in a kit folder: the only place that knows a file's name."""
 
+from drkid.kit import class_id
+
 KIT_JSON = "kit.json"
 SURFACE = "surface.ply"
 SIMPLIFIED = "simplified.ply"
@@ -15,16 +17,6 @@ NET_SVG, NET_PDF = "net.svg", "net.pdf"
 GUIDE_HTML, GUIDE_PDF = "guide.html", "guide.pdf"
 REPORT = "report.html"
 COUPON = "coupon.stl"
-
-
-def class_id(index: int) -> str:
-    """The letters A, B, …, Z, AA, AB, … of classes 0, 1, 2, and so on."""
-    letters = ""
-    index += 1
-    while index:
-        index, digit = divmod(index - 1, 26)
-        letters = chr(ord("A") + digit) + letters
-    return letters
 
 
 def part_file(index: int, handedness: str) -> str:

@@ -7,7 +7,7 @@ from math import ceil, degrees
 import numpy as np
 
 from drkid.errors import FitError
-from drkid.kit import Connector, Decomposition, Dimensions, Part, PartSet
+from drkid.kit import Connector, Decomposition, Dimensions, Part, PartSet, class_id
 from drkid.mesh import Floats, Ints, read_only
 from drkid.parts.class_triangle import LEFT_CORNERS, is_mirror_symmetric, laid_down
 from drkid.parts.dimensions import proposed
@@ -110,7 +110,7 @@ def _scale(design: _Design) -> float:
     if margin.slack_mm < FITS_MM:
         sides = ", ".join(f"{x:.1f}" for x in design.decomposition.class_lengths[index] * size / design.longest)
         raise FitError(
-            f"the {margin.what} of class {index + 1} (sides {sides} mm) does not fit at size_mm {size:g}",
+            f"the {margin.what} of class {class_id(index)} (sides {sides} mm) does not fit at size_mm {size:g}",
             wanted=f"{margin.needed_mm:.2f} mm",
             found=f"{margin.available_mm:.2f} mm",
             remedy=f"a larger print (--size-mm {design.smallest_size_mm()} or more), fewer pieces (--faces), "
@@ -162,7 +162,7 @@ def _require_bed(part: Part, spec: KitSpec) -> None:
     size = np.sort(np.ptp(part.solid.bounds, axis=0))
     if (size > np.sort(spec.bed_mm)).any():
         raise FitError(
-            f"a piece of class {part.class_index + 1} is larger than the printer's bed",
+            f"a piece of class {class_id(part.class_index)} is larger than the printer's bed",
             wanted=" × ".join(f"{x:g}" for x in spec.bed_mm) + " mm at most",
             found=" × ".join(f"{x:.1f}" for x in size) + " mm",
             remedy="a smaller print (--size-mm), more pieces (--faces), or a larger bed (--bed-mm)",

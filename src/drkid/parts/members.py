@@ -67,7 +67,10 @@ def _symmetrised(class_lengths: Floats) -> Floats:
 
 
 def _laid(side_lengths: Floats, lengths: Floats, face_class: Ints) -> tuple[Bools, Ints]:
-    """Which hand (F,) and turn (F,) lay each face's sides (F, 3) best on those of its class."""
+    """Which hand (F,) and turn (F,) lay each face's sides (F, 3) best on those of its class.
+
+    Right goes before left where both fit alike, as they do in a class with equal sides: such a piece is only turned.
+    """
     wanted = lengths[face_class]
     mismatch = np.stack(
         [
@@ -77,8 +80,6 @@ def _laid(side_lengths: Floats, lengths: Floats, face_class: Ints) -> tuple[Bool
         ],
         axis=1,
     )
-    symmetric = np.array([equal_sides(row)[-1] < 2 for row in lengths])[face_class]
-    mismatch[symmetric, 3:] = np.inf  # its own mirror image: turned only, never mirrored
     allowed = mismatch.min(axis=1) + TIE * (wanted**2).sum(axis=1)
     choice = np.argmax(mismatch <= allowed[:, None], axis=1)
     return choice >= 3, (choice % 3).astype(np.int64)

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from drkid.kit import Decomposition, Dimensions
+from drkid.kit import Decomposition, Dimensions, class_id
 from drkid.mesh import Floats
 from drkid.parts.bevel import SHARPEST_JOINT_DEGREES, demanded
 from drkid.parts.groove import touching_mm
@@ -70,8 +70,8 @@ def _short_notes(
         own = missing[members.face_class == index]
         for side in np.flatnonzero((own > TOUCH_MM).any(axis=0)):
             yield (
-                f"Class {index + 1}, side {side + 1}: its bevel stops short of what every joint asks, or the connector "
-                f"would have no hold; {int((own[:, side] > TOUCH_MM).sum())} sides lack up to "
+                f"Class {class_id(index)}, side {side + 1}: its bevel stops short of what every joint asks, or the "
+                f"connector would have no hold; {int((own[:, side] > TOUCH_MM).sum())} sides lack up to "
                 f"{own[:, side].max():.2f} mm and touch or cannot swing by {spec.swing_degrees:g}°."
             )
 

@@ -14,6 +14,7 @@ from numba import njit
 from scipy.optimize import minimize
 from scipy.spatial import cKDTree
 
+from drkid.errors import RemeshError
 from drkid.mesh import Floats, Ints, TriMesh
 
 NEIGHBOURS = 24  # of a seed, by which cells are clipped at first; doubled where the security radius asks for more
@@ -186,21 +187,27 @@ def _restricted_voronoi(
 
 
 def tessellate(surface: TriMesh, seeds: Floats) -> Tessellation:
-    """The restricted Voronoi diagram of `seeds` (N, 3), N ≥ 2, which need not lie on the surface, and its dual."""
+    """The restricted Voronoi diagram of `seeds` (N, 3), N ≥ 2, all different, on the surface or near it.
+
+    Raises:
+        RemeshError: a cell has more corners in one triangle than there is room for.
+    """
     tree = cKDTree(seeds)
     first = np.asarray(tree.query(surface.corners.mean(axis=1))[1], np.int64)
     others = min(NEIGHBOURS, len(seeds) - 1)
     while True:
-        apart, near = (np.asarray(a) for a in tree.query(seeds, k=others + 1))
-        # A seed that shares its place with another need not come first among its own neighbours.
-        itself = near == np.arange(len(seeds))[:, None]
-        itself[~itself.any(axis=1), -1] = True
-        shape = (len(seeds), others)
-        cells, triangles, sure = _restricted_voronoi(
-            surface.corners, first, seeds, near[~itself].reshape(shape), (apart[~itself] ** 2).reshape(shape)
-        )
-        if sure or others == len(seeds) - 1:
+        apart, near = map(np.asarray, tree.query(seeds, k=others + 1))  # the first is the seed itself
+        near = np.ascontiguousarray(near[:, 1:], np.int64)
+        cells, triangles, sure = _restricted_voronoi(surface.corners, first, seeds, near, apart[:, 1:] ** 2)
+        if sure:
             return Tessellation(cells[:, 0], cells[:, 2:], cells[:, 1], triangles)
+        if others == len(seeds) - 1:
+            raise RemeshError(
+                "seeds lie too unevenly for a Voronoi diagram",
+                wanted=f"cells of fewer than {CORNERS} corners",
+                found="a cell of more",
+                remedy="another --seed",
+            )
         others = min(2 * others, len(seeds) - 1)
 
 

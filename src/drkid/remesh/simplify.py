@@ -1,14 +1,14 @@
 """From the surface to the simplified mesh: Voronoi cells, their dual, and what mends it where cells are no disks."""
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from drkid.errors import RemeshError, SpecError
 from drkid.intersection import self_intersections
 from drkid.kit import Simplified, Surface
-from drkid.measure import edge_spread
+from drkid.measure import bend_radians, edge_spread, smallest_angle_degrees
 from drkid.mesh import Floats, TriMesh
 from drkid.progress import Progress, silent
 from drkid.remesh.centroidal_voronoi import lloyd, quasi_newton
@@ -23,8 +23,11 @@ from drkid.spec import KitSpec
 
 MOST_VERTICES = 50_000  # a hundred thousand pieces: nobody assembles more, and memory stays below a few GB
 FINENESS = 10  # vertices of the surface for each one wanted: cells of its vertices then have shapes
-EVENING_ROUNDS = 6  # of flips and relaxation in turn; later ones find no flip to make
+TOUCH_UP = 2  # rounds of flips and relaxation after a tessellation, which is even: more only rounds tips and rims off
+EVENING = 6  # rounds after a collapse, which is not; later ones find no flip to make
 RELAXATIONS = 3  # in each of these rounds
+SLIVER_DEGREES = 12.0  # a face with a smaller angle is too narrow for a piece
+FOLD_DEGREES = 130.0  # between the normals of neighbours: a little motion makes a sharper fold cut itself
 UNEVEN = 0.2  # standard deviation of the edges over their mean, above which the user should hear of it
 
 
@@ -99,48 +102,64 @@ def _faces(vertices: int, genus: int) -> int:
 
 
 def _best(surface: TriMesh, seeds: Floats, count: int, spec: KitSpec) -> Simplified:
-    """The first mesh that does not cut itself, or else the one that does so least."""
-    closest, fewest = ClosestPoint(surface), None
-    stuck = []
-    for draft, notes in _drafts(closest, seeds, count, spec):
-        if len(draft.vertices) != count or not is_twin(draft, surface):
-            stuck.append(len(draft.vertices))
+    """The first mesh without flaws: cuts through itself, slivers and folds; or else the one that has least of them."""
+    closest, reached = ClosestPoint(surface), list[int]()
+    best: tuple[tuple[int, float], Simplified] | None = None
+    for draft in _drafts(closest, seeds, count, spec):
+        if len(draft.mesh.vertices) != count or not is_twin(draft.mesh, surface):
+            reached.append(len(draft.mesh.vertices))
             continue
-        for mesh in (_evened(draft, closest), draft):
-            cuts = len(self_intersections(mesh))
-            if cuts == 0:
-                return Simplified(mesh, (), notes + _unevenness(mesh))
-            if fewest is None or cuts < fewest[0]:
-                fewest = cuts, mesh, notes
-    if fewest is None:
-        raise _hopeless(count, stuck, surface)
-    cuts, mesh, notes = fewest
-    cut = f"the simplified mesh cuts itself at {cuts} pairs of faces: more --faces, or a smoother surface, help"
-    return Simplified(mesh, (), (*notes, cut, *_unevenness(mesh)))
+        for mesh in (_evened(draft.mesh, closest, draft.rounds), draft.mesh):
+            flaws = _flaws(mesh)
+            if best is None or flaws < best[0]:
+                best = flaws, Simplified(mesh, (), draft.notes + _unevenness(mesh))
+            if flaws == (0, 0):
+                return best[1]
+    if best is None:
+        raise _hopeless(count, reached, surface)
+    (cuts, _), found = best
+    note = f"the simplified mesh cuts itself at {cuts} pairs of faces: more --faces, or a smoother surface, help"
+    return replace(found, notes=(*found.notes, note)) if cuts else found
 
 
-def _drafts(
-    closest: ClosestPoint, seeds: Floats, count: int, spec: KitSpec
-) -> Iterator[tuple[TriMesh, tuple[str, ...]]]:
-    """Meshes of `count` vertices on the surface, if it can be done at all, the most even first, and what to say."""
+def _flaws(mesh: TriMesh) -> tuple[int, float]:
+    """Pairs of faces that cut, and by how many degrees the narrowest corner or the sharpest fold is too sharp."""
+    fold = float(np.degrees(np.abs(bend_radians(mesh)).max())) - FOLD_DEGREES
+    return len(self_intersections(mesh)), max(0.0, SLIVER_DEGREES - smallest_angle_degrees(mesh), fold)
+
+
+@dataclass(frozen=True, eq=False)
+class _Draft:
+    """A mesh on the surface, how many rounds of evening it deserves, and what the user should know of it."""
+
+    mesh: TriMesh
+    rounds: int
+    notes: tuple[str, ...] = ()
+
+
+def _drafts(closest: ClosestPoint, seeds: Floats, count: int, spec: KitSpec) -> Iterator[_Draft]:
+    """Meshes of `count` vertices on the surface, or of more where it cannot be done; the most even first."""
     plain = dual(closest, seeds)
     if plain is not None:
-        yield plain, ()
+        yield _Draft(plain, 0 if np.isin(plain.valence, (5, 6, 7)).all() else TOUCH_UP)
     fine = subdivided(closest.surface, FINENESS * count)
     refined = refined_dual(fine, seeds)
+    needed = len(refined.vertices)
     note = (
-        f"parts of the surface are thinner than an edge: {_faces(len(refined.vertices), refined.genus)} faces "
-        f"would follow it, edges were collapsed to reach {_faces(count, refined.genus)}",
+        f"parts of the surface are thinner than an edge: {_faces(needed, refined.genus)} faces would follow it, "
+        f"edges were collapsed to reach {_faces(count, refined.genus)}",
     )
-    yield collapse_to(refined, count), note
+    if needed >= count:  # two seeds may have gone to the same vertex
+        yield _Draft(collapse_to(refined, count), EVENING, note if needed > count else ())
     rng = np.random.default_rng(spec.seed)
     for factor in (2, 4):
-        yield collapse_to(refined_dual(fine, farthest_points(fine, factor * count, rng)), count), note
-    yield collapse_to(fine, count), note
+        denser = refined_dual(fine, farthest_points(fine, factor * count, rng))
+        yield _Draft(collapse_to(denser, count), EVENING, note)
+    yield _Draft(collapse_to(fine, count), EVENING, note)
 
 
-def _evened(mesh: TriMesh, closest: ClosestPoint) -> TriMesh:
-    for _ in range(EVENING_ROUNDS):
+def _evened(mesh: TriMesh, closest: ClosestPoint, rounds: int) -> TriMesh:
+    for _ in range(rounds):
         mesh, _ = flip_towards_valence_six(mesh)
         mesh = relax(mesh, closest, RELAXATIONS)
     return mesh
@@ -153,11 +172,12 @@ def _unevenness(mesh: TriMesh) -> tuple[str, ...]:
     return (f"edges are uneven (standard deviation {100 * spread:.0f} % of the mean); more faces help",)
 
 
-def _hopeless(count: int, stuck: list[int], surface: TriMesh) -> RemeshError:
-    smallest = min(stuck)
+def _hopeless(count: int, reached: list[int], surface: TriMesh) -> RemeshError:
+    # A draft that has the vertices wanted, or fewer, was refused for its orientation: then just ask for some more.
+    smallest = min((number for number in reached if number > count), default=2 * count)
     return RemeshError(
         f"no closed mesh of {count} vertices follows this surface",
         wanted=f"{count} vertices, {_faces(count, surface.genus)} faces, {surface.genus} handles",
-        found=f"{smallest} vertices, {_faces(smallest, surface.genus)} faces at least",
+        found=f"meshes of {', '.join(map(str, sorted(set(reached))))} vertices",
         remedy=f"--faces {_faces(smallest, surface.genus)} or more, or a smoother surface",
     )

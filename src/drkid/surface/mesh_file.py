@@ -25,6 +25,7 @@ FLAT_DIAGONALS = 1e-9  # a face whose altitude is below this times the diagonal 
 _FAULTS: tuple[type[Exception], ...] = (
     OSError,
     EOFError,
+    ImportError,  # trimesh asks for a guesser of encodings when a text is none
     ValueError,
     TypeError,
     KeyError,

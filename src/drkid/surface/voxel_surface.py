@@ -39,7 +39,7 @@ def surface_of_volume(volume: LabelVolume, spec: KitSpec, progress: Progress) ->
         debris_dropped=len(found.voxels) - 1 + other_bodies,
         touches_border=bool(taken.border),
         max_displacement_voxels=moved,
-        notes=(*volume.notes, *inside.notes, *_notes(found, rank, taken, moved)),
+        notes=(*volume.notes, *inside.notes, *_notes(found, rank, taken), *_notes_of(mesh, moved)),
     )
 
 
@@ -72,7 +72,7 @@ def _excess_density(taken: VoxelObject, values: Voxels, threshold: float) -> Flo
     return np.where(taken.mask, np.maximum(inside, hair), np.minimum(outside, -hair))
 
 
-def _notes(found: Components, rank: int, taken: VoxelObject, moved: float) -> list[str]:
+def _notes(found: Components, rank: int, taken: VoxelObject) -> list[str]:
     notes: list[str] = []
     others = len(found.voxels) - 1
     if others:
@@ -85,6 +85,14 @@ def _notes(found: Components, rank: int, taken: VoxelObject, moved: float) -> li
         notes.append(f"{taken.cavities} enclosed {'cavities' if taken.cavities > 1 else 'cavity'} filled")
     if taken.border:
         notes.append(f"the object touches the end of the volume ({', '.join(taken.border)}) and is closed flat there")
+    return notes
+
+
+def _notes_of(mesh: TriMesh, moved: float) -> list[str]:
+    notes: list[str] = []
+    if mesh.genus:
+        handles = f"{mesh.genus} handle{'s' * (mesh.genus > 1)}"
+        notes.append(f"the surface has {handles}; where they are noise, close the holes of the segmentation first")
     if moved:
         notes.append(f"the staircase of voxels is removed: nothing moved by more than {moved:.2f} voxels")
     return notes

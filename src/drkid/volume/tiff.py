@@ -1,8 +1,11 @@
 """TIFF stacks, with the voxel sizes of OME-TIFF and ImageJ: z, y, x."""
 
+import logging
 import re
 import struct
 import zlib
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -32,8 +35,12 @@ _STACK_AXES = "IQ"  # pages of a plain TIFF, to which tifffile gives no meaning:
 
 
 def read(path: Path) -> Stored:
-    """The first image series at full resolution."""
-    with tifffile.TiffFile(path) as file:
+    """The first image series at full resolution.
+
+    Raises:
+        TiffFileError: the chain of pages is broken, so that slices would be missing (tifffile only logs it).
+    """
+    with _complaints() as complaints, tifffile.TiffFile(path) as file:
         series = file.series[0]
         values, axes = np.asarray(series.asarray()), _axes(series.axes, series.shape)
         if file.is_ome and file.ome_metadata:
@@ -42,7 +49,23 @@ def read(path: Path) -> Stored:
             spacing, unit = _imagej_spacing(file.imagej_metadata, file.pages.first)
         else:
             spacing, unit = None, None
-    return Stored(values, axes, spacing, unit)
+    broken = [text for text in complaints if "page" in text]
+    if broken:
+        raise tifffile.TiffFileError(broken[0])
+    return Stored(values, axes, spacing, unit, tuple(f"the header is odd: {text}" for text in complaints))
+
+
+@contextmanager
+def _complaints() -> Generator[list[str], None, None]:
+    """What tifffile logs as an error meanwhile."""
+    texts: list[str] = []
+    handler = logging.Handler(logging.ERROR)
+    handler.emit = lambda record: texts.append(record.getMessage())
+    tifffile.logger().addHandler(handler)
+    try:
+        yield texts
+    finally:
+        tifffile.logger().removeHandler(handler)
 
 
 def _axes(axes: str, shape: tuple[int, ...]) -> str:

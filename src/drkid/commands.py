@@ -1,0 +1,197 @@
+"""The commands of the command line; the flags of a kit come from KitSpec. No geometry."""
+
+import inspect
+import json
+import time
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Group, Parameter
+
+from drkid.errors import SpecError
+from drkid.spec import KitSpec
+from drkid.terminal import StageLines, show_inspection, show_json, show_kit, show_verification
+
+STALLED = 3  # exit status: the kit is written, but the asked tolerance was not reached
+NOT_AS_STATED = 1  # exit status of `check` for a kit whose files do not bear out its numbers
+GROUPS = ("Input", "Mesh", "Congruence", "Pieces")  # in the order in which help shows them
+
+# ---- flags from KitSpec
+
+
+def _spec_parameters() -> list[inspect.Parameter]:
+    """One keyword for each field of KitSpec; None where it is not given."""
+    found: list[inspect.Parameter] = []
+    for name, field in KitSpec.model_fields.items():
+        extra = field.json_schema_extra
+        group = str(extra["group"]) if isinstance(extra, dict) else GROUPS[0]
+        annotation: Any = str if name in ("spacing", "bed_mm") else field.annotation
+        default = "" if field.default is None else f" [default: {_shown(field.default)}]"
+        option = Parameter(
+            help=f"{field.description}{default}", group=Group(group, sort_key=GROUPS.index(group)), show_default=False
+        )
+        found.append(
+            inspect.Parameter(
+                name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[annotation | None, option]
+            )
+        )
+    return found
+
+
+def _shown(value: object) -> str:
+    return ",".join(f"{v:g}" for v in value) if isinstance(value, tuple) else str(value)
+
+
+def _with_spec_flags(command: Callable[..., int]) -> Callable[..., int]:
+    """Give a command, in place of its `**flags`, one flag for each parameter of a kit."""
+    own = [p for p in inspect.signature(command).parameters.values() if p.kind is not inspect.Parameter.VAR_KEYWORD]
+    parameters = [*own, *_spec_parameters()]
+    command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    command.__annotations__ = {p.name: p.annotation for p in parameters} | {"return": int}
+    return command
+
+
+def _spec(file: Path | None, flags: dict[str, Any]) -> KitSpec:
+    """Parameters of a file, then what was given on the command line over them."""
+    values = {} if file is None else _spec_file(file)
+    given = {name: value for name, value in flags.items() if value is not None}
+    if "vertices" in given and "faces" not in given:
+        values.pop("faces", None)
+    if "faces" in given and "vertices" not in given:
+        values.pop("vertices", None)
+    return KitSpec.parse(values | given)
+
+
+def _spec_file(path: Path) -> dict[str, Any]:
+    try:
+        text = path.read_text(encoding="utf-8")
+        values = tomllib.loads(text) if path.suffix.lower() == ".toml" else json.loads(text)
+    except (OSError, ValueError) as error:
+        raise SpecError(
+            f"{path} cannot be read",
+            wanted="a kit.json, or a JSON or TOML file of parameters",
+            found=str(error),
+            remedy="drkid schema spec",
+        ) from error
+    if not isinstance(values, dict):
+        raise SpecError(
+            f"{path} holds no parameters", wanted="an object of names and values", found=type(values).__name__
+        )
+    return values["spec"] if isinstance(values.get("spec"), dict) else values
+
+
+# ---- commands
+
+Input = Annotated[
+    Path | None,
+    Parameter(
+        help="Segmented volume (.mrc .map .nii .tif .nrrd .npy .zarr, gzipped too) or closed mesh (.stl .ply .obj .off "
+        ".glb .3mf); the bundled cell nucleus when not given."
+    ),
+]
+Json = Annotated[bool, Parameter(name="--json", negative=(), help="Print JSON for machines instead of text.")]
+SpecFile = Annotated[
+    Path | None,
+    Parameter(help="Parameters from a kit.json (makes the same kit again), JSON or TOML; flags override."),
+]
+
+
+@_with_spec_flags
+def make(
+    source: Annotated[Input, Parameter(name="INPUT")] = None,
+    /,
+    *,
+    out_folder: Annotated[
+        Path | None, Parameter(name="--out", help="Folder to write; named after the input when not given.")
+    ] = None,
+    force: Annotated[bool, Parameter(negative=(), help="Replace a kit folder that exists.")] = False,
+    as_json: Json = False,
+    spec_file: Annotated[SpecFile, Parameter(name="--spec")] = None,
+    **flags: Any,
+) -> int:
+    """Make a kit: classes of identical pieces with pockets and hinges, ready to print.
+
+    Examples:
+        drkid make
+        drkid make mitochondrion.nii.gz --faces 172 --classes 7 --out mito
+        drkid make labels.tif --label 12 --size-mm 250 --process sla
+        drkid make density.mrc --threshold 0.3 --spacing 5.7,5.7,5.7 --unit angstrom
+    """
+    spec = _spec(spec_file, flags)
+    folder = out_folder if out_folder is not None else Path(f"{_stem(source)}-kit")
+    from drkid.export import kit_summary, require_writable  # noqa: PLC0415 — after the arguments are known to be good
+    from drkid.pipeline import make_kit  # noqa: PLC0415
+
+    require_writable(folder, force)
+    start = time.perf_counter()
+    with StageLines(quiet=as_json) as lines:
+        kit = make_kit(source, spec, lines.update)
+        lines.update("export", "", 0.0)
+        written = kit.write(folder, force=force)
+        lines.update("export", "", 1.0)
+    seconds = time.perf_counter() - start
+    if as_json:
+        show_json({"folder": str(written), "seconds": round(seconds, 3), **kit_summary(kit)})
+    else:
+        show_kit(kit, written, seconds)
+    return 0 if kit.decomposition.outcome.status == "converged" else STALLED
+
+
+@_with_spec_flags
+def inspect_source(
+    source: Annotated[Input, Parameter(name="INPUT")] = None, /, *, as_json: Json = False, **flags: Any
+) -> int:
+    """Tell what a file holds and what `make` would take of it, without making anything.
+
+    Examples:
+        drkid inspect labels.tif
+        drkid inspect labels.tif --label 12 --json
+    """
+    spec = _spec(None, flags)
+    from drkid import inspection  # noqa: PLC0415
+    from drkid.data import nucleus_path  # noqa: PLC0415
+
+    found = inspection.inspect_source(nucleus_path() if source is None else source, spec)
+    if as_json:
+        show_json(found.to_dict())
+    else:
+        show_inspection(found)
+    return 0
+
+
+def schema(what: Annotated[str, Parameter(help="kit: of kit.json; spec: of the parameters.")] = "kit", /) -> int:
+    """Print a JSON Schema: of kit.json, or of the parameters of a kit."""
+    if what == "spec":
+        document = KitSpec.model_json_schema()
+    elif what == "kit":
+        from drkid.export.document import KitDocument  # noqa: PLC0415
+
+        document = KitDocument.model_json_schema(by_alias=True)
+    else:
+        raise SpecError(f"there is no schema of {what}", wanted="kit or spec", found=what, remedy="drkid schema kit")
+    show_json(document)
+    return 0
+
+
+def check(kit: Annotated[Path, Parameter(name="KIT", help="A kit folder.")], /, *, as_json: Json = False) -> int:
+    """Re-read a kit folder and recompute its numbers; exit status 1 where a file does not bear them out."""
+    from drkid.verification import verify_kit  # noqa: PLC0415
+
+    found = verify_kit(kit)
+    if as_json:
+        checks = [{"name": c.name, "passed": c.passed, "detail": c.detail} for c in found.checks]
+        show_json({"kit": str(kit), "passed": found.passed, "checks": checks})
+    else:
+        show_verification(found)
+    return 0 if found.passed else NOT_AS_STATED
+
+
+def _stem(source: Path | None) -> str:
+    if source is None:
+        return "nucleus"
+    name = source.name
+    for suffix in (".gz", ".nii", ".ome", source.suffix):
+        name = name.removesuffix(suffix) or name
+    return Path(name).stem or "drkid"

@@ -1,0 +1,198 @@
+"""What the command line says: progress lines, tables, errors."""
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.table import Table
+
+from drkid.errors import DrkidError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from drkid.inspection import Inspection
+    from drkid.kit import Kit
+    from drkid.verification import Verification
+
+MOST_ROWS = 30  # of labels or components that a table shows
+
+
+def _out() -> Console:
+    return Console(highlight=False)
+
+
+def _err() -> Console:
+    return Console(stderr=True, highlight=False)
+
+
+def _plain(text: str) -> str:
+    """Text in which rich sees no markup."""
+    return text.replace("[", "\\[")
+
+
+def tell_error(error: DrkidError) -> None:
+    """What was wrong, wanted and found, and what to try, on standard error."""
+    console = _err()
+    console.print(f"[bold red]error:[/] {_plain(error.problem)}", soft_wrap=True)
+    for name, text in (("wanted", error.wanted), ("found", error.found), ("try", error.remedy)):
+        if text:
+            console.print(f"  [dim]{name}:[/] {_plain(text)}", soft_wrap=True)
+
+
+def tell_interrupted() -> None:
+    """After Ctrl-C."""
+    _err().print("interrupted; nothing was written")
+
+
+def show_json(document: object) -> None:
+    """A document for machines, alone on standard output."""
+    print(json.dumps(document, indent=1))
+
+
+class StageLines:
+    """One line per stage on standard error, with a bar where it takes long and the time it took."""
+
+    def __init__(self, *, quiet: bool) -> None:
+        """Nothing is shown where `quiet`."""
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn  # noqa: PLC0415 — slow to import
+
+        self._bars = Progress(
+            TextColumn("{task.description:<11}"),
+            BarColumn(bar_width=24),
+            TimeElapsedColumn(),
+            TextColumn("[dim]{task.fields[what]}"),
+            console=_err(),
+            disable=quiet,
+        )
+        self._tasks: dict[str, Any] = {}
+
+    def __enter__(self) -> "StageLines":
+        """Start drawing."""
+        self._bars.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Stop drawing; the lines stay."""
+        self._bars.stop()
+
+    def update(self, stage: str, what: str, fraction: float) -> None:
+        """Show how far a stage is."""
+        if stage not in self._tasks:
+            self._tasks[stage] = self._bars.add_task(stage, total=1.0, what="")
+        self._bars.update(self._tasks[stage], completed=min(fraction, 1.0), what=_plain(what))
+
+
+def show_kit(kit: "Kit", folder: "Path", seconds: float) -> None:
+    """The notes, then a short table: what the kit is, how good it is, and where."""
+    console, metrics = _out(), kit.metrics
+    for note in kit.notes:
+        console.print(f"[yellow]note:[/] {_plain(note)}", soft_wrap=True)
+    size = " × ".join(f"{x:.0f}" for x in kit.decomposition.mesh.extents)
+    distance, outcome = metrics.surface_assembled, kit.decomposition.outcome
+    rows = {
+        "pieces": f"{metrics.pieces} in {metrics.classes} classes, {metrics.unique_piece_parts} moulds",
+        "error": f"T {metrics.error_max_percent:.3g} % (largest), {metrics.error_mean_percent:.3g} % mean, "
+        "of the mean edge",
+        "d_H": f"{distance.mean_percent:.2g} % mean, {distance.max_percent:.2g} % max from the input, of its box",
+        "size": f"{size} mm, edges {metrics.mean_edge:.1f} mm, {kit.part_set.dimensions.thickness_mm:g} mm thick",
+        "grooves": f"{metrics.groove_mean_mm:.2g} mm mean, {metrics.groove_max_mm:.2g} mm max",
+        "solver": f"{outcome.status}: {outcome.message}",
+        "time": f"{seconds:.1f} s",
+        "kit": str(folder),
+    }
+    _show_rows(console, rows)
+
+
+def show_verification(found: "Verification") -> None:
+    """One line per check, then how many passed."""
+    console = _out()
+    for one in found.checks:
+        word = "[green]ok  [/]" if one.passed else "[bold red]FAIL[/]"
+        console.print(f"{word} {_plain(one.name)}: {_plain(one.detail)}", soft_wrap=True)
+    failed = sum(not one.passed for one in found.checks)
+    console.print(f"{len(found.checks) - failed} of {len(found.checks)} checks passed")
+
+
+def show_inspection(found: "Inspection") -> None:
+    """What the file holds, its labels and components, and what `make` would take."""
+    console = _out()
+    console.print(f"[bold]{_plain(found.name)}[/]", soft_wrap=True)
+    _show_rows(console, _contents(found))
+    if found.volume is not None and len(found.volume.labels) > 1:
+        table = Table("label", "voxels", "from", "to", "border", title="labels", title_justify="left", box=None)
+        for label in found.volume.labels[:MOST_ROWS]:
+            table.add_row(
+                str(label.label),
+                str(label.voxels),
+                _triple(label.first),
+                _triple(label.last),
+                _yes(label.touches_border),
+            )
+        console.print(table)
+        _more(console, len(found.volume.labels))
+    if found.components:
+        table = Table("component", "voxels", "genus", "cavities", "border", title_justify="left", box=None)
+        for one in found.components[:MOST_ROWS]:
+            genus = "too small" if one.genus is None else str(one.genus)
+            table.add_row(str(one.component), str(one.voxels), genus, str(one.cavities), _yes(one.touches_border))
+        console.print(table)
+        _more(console, found.component_count)
+    console.print("[bold]make would take[/]")
+    _show_rows(console, _taken(found))
+    for note in found.notes:
+        console.print(f"[yellow]note:[/] {_plain(note)}", soft_wrap=True)
+    for warning in found.warnings:
+        console.print(f"[bold red]warning:[/] {_plain(warning)}", soft_wrap=True)
+
+
+def _contents(found: "Inspection") -> dict[str, str]:
+    unit = found.unit or "units"
+    rows = {"format": found.format}
+    volume, mesh = found.volume, found.mesh
+    if volume is not None:
+        rows["voxels"] = f"{_triple(volume.shape)} {volume.dtype}, {volume.kind}"
+        rows["voxel size"] = f"{_triple(volume.spacing)} {unit}"
+    if volume is not None and volume.density_range is not None:
+        low, high = volume.density_range
+        rows["densities"] = f"{low:.4g} to {high:.4g}, Otsu's threshold {volume.otsu_threshold:.4g}"
+    if mesh is not None:
+        closed = "closed" if mesh.closed else "open"
+        rows["mesh"] = f"{mesh.vertices} vertices, {mesh.faces} faces, {closed}; bodies in the file: {mesh.bodies}"
+    return rows
+
+
+def _taken(found: "Inspection") -> dict[str, str]:
+    taken, unit = found.taken, found.unit or "units"
+    chosen = {"label": taken.label, "threshold": taken.threshold, "component": taken.component}
+    rows = {name: f"{value:g}" for name, value in chosen.items() if value is not None}
+    rows["genus"] = str(taken.genus)
+    rows["size"] = f"{_triple(taken.extents)} {unit}"
+    rows["surface"] = f"{taken.area:.4g} {unit}², volume {taken.volume:.4g} {unit}³"
+    if taken.mean_edge is not None:
+        rows["pieces"] = f"{taken.faces} ({taken.vertices} vertices), mean edge {taken.mean_edge:.4g} {unit}"
+    if found.thickness is not None:
+        rows["thickness"] = (
+            f"{found.thickness.thin:.4g} {unit} at the thinnest 1 %, {found.thickness.typical:.4g} typical"
+        )
+    return rows
+
+
+def _show_rows(console: Console, rows: dict[str, str]) -> None:
+    """Names and texts in two columns; long texts, such as paths, are never cut."""
+    width = max(map(len, rows))
+    for name, text in rows.items():
+        console.print(f"[bold]{name:<{width}}[/]  {_plain(text)}", soft_wrap=True)
+
+
+def _triple(values: "tuple[float, ...]") -> str:
+    return " × ".join(f"{v:.6g}" for v in values)
+
+
+def _yes(value: bool) -> str:
+    return "yes" if value else "no"
+
+
+def _more(console: Console, count: int) -> None:
+    if count > MOST_ROWS:
+        console.print(f"… and {count - MOST_ROWS} more (--json lists them)")

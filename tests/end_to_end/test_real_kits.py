@@ -1,0 +1,81 @@
+"""Kits of real shapes, written and read back; the nucleus ships with the package, the others may be absent."""
+
+import json
+
+import numpy as np
+import pytest
+import trimesh
+
+import drkid
+from drkid.verification import verify_kit
+
+GOOD = {
+    "urocell_mito_bean.nii.gz": {},
+    "urocell_mito_elongated.nii.gz": {},
+    "wtc11_nucleus.ome.tif": {},
+    "cells3d_nuclei_labels.ome.tif": {"label": 12},
+    "golgi_vesicle.mrc": {},
+    "emdb_soft_mask.map": {},
+    "celegans_embryo_cell.ply": {},
+    "asteroid_itokawa.obj": {},
+    "spot_uv_seams.obj": {},
+}
+
+
+@pytest.fixture(scope="module")
+def nucleus(tmp_path_factory):
+    kit = drkid.make_kit(None, drkid.KitSpec(faces=100, classes=6, tolerance_percent=4))
+    return kit, kit.write(tmp_path_factory.mktemp("nucleus") / "kit")
+
+
+def test_the_bundled_nucleus_becomes_a_kit_that_bears_out_its_numbers(nucleus):
+    kit, folder = nucleus
+    found = verify_kit(folder)
+    assert [check.name for check in found.checks if not check.passed] == []
+    assert kit.source.voxel_unit == "um"
+    assert kit.source.voxel_size == pytest.approx((0.26, 0.26, 0.29))
+
+
+def test_the_placed_parts_make_the_surface(nucleus):
+    """The printed files alone, placed as kit.json says, cover the assembled surface within their thickness."""
+    _, folder = nucleus
+    document = json.loads((folder / "kit.json").read_text())
+    assembled = trimesh.load_mesh(folder / "assembled.ply", process=False)
+    parts = {part["file"]: trimesh.load_mesh(folder / part["file"]) for c in document["classes"] for part in c["parts"]}
+    centres = np.asarray(assembled.triangles_center)
+    for piece in document["pieces"]:
+        placed = parts[piece["part"]].copy().apply_transform(np.reshape(piece["transform"], (4, 4)))
+        low, high = placed.bounds
+        assert (low < centres[piece["face"]]).all()
+        assert (centres[piece["face"]] < high).all()
+        normal = np.reshape(piece["transform"], (4, 4))[:3, 2]
+        assert normal @ assembled.face_normals[piece["face"]] > 0.99
+
+
+def test_the_volume_of_the_printed_object_is_that_of_the_voxels(nucleus):
+    kit, folder = nucleus
+    surface = trimesh.load_mesh(folder / "surface.ply", process=False)
+    voxels = 47191 * np.prod(kit.source.voxel_size) * kit.part_set.scale_mm_per_unit**3
+    assert surface.volume == pytest.approx(voxels, rel=0.03)
+
+
+def test_the_seed_decides_the_kit(nucleus):
+    kit, _ = nucleus
+    again = drkid.make_kit(None, drkid.KitSpec(faces=100, classes=6, tolerance_percent=4))
+    assert (again.decomposition.mesh.vertices == kit.decomposition.mesh.vertices).all()
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_every_good_shape_becomes_a_kit(name, shared_data, tmp_path):
+    kit = drkid.make_kit(shared_data / name, drkid.KitSpec(faces=172, classes=7, **GOOD[name]))
+    found = verify_kit(kit.write(tmp_path / "kit"))
+    assert [check.name for check in found.checks if not check.passed] == []
+    assert kit.metrics.error_max_percent <= 5
+    assert kit.metrics.surface_assembled.mean_percent < 2
+
+
+@pytest.mark.parametrize("name", ["urocell_mito_genus3.nii.gz", "torus_genus1.stl"])
+def test_handles_are_kept(name, shared_data, tmp_path):
+    kit = drkid.make_kit(shared_data / name, drkid.KitSpec(faces=400, classes=8, max_iterations=1000))
+    assert kit.metrics.genus == {"urocell_mito_genus3.nii.gz": 3, "torus_genus1.stl": 1}[name]
+    assert verify_kit(kit.write(tmp_path / "kit")).passed

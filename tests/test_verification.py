@@ -1,0 +1,129 @@
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drkid.errors import KitFolderError
+from drkid.export.ply import ply_bytes
+from drkid.export.stl import stl_bytes
+from drkid.mesh import TriMesh
+from drkid.verification import verify_kit
+
+
+@pytest.fixture
+def copy(kit_folder, tmp_path) -> Path:
+    return Path(shutil.copytree(kit_folder, tmp_path / "kit"))
+
+
+def failures(folder: Path) -> set[str]:
+    return {check.name for check in verify_kit(folder).checks if not check.passed}
+
+
+def edit(folder: Path, change) -> None:
+    path = folder / "kit.json"
+    document = json.loads(path.read_text())
+    change(document)
+    path.write_text(json.dumps(document))
+
+
+def test_a_kit_as_written_bears_out_all_that_it_states(kit_folder):
+    found = verify_kit(kit_folder)
+    assert found.passed
+    assert len(found.checks) > 20
+
+
+def metric(name, factor):
+    def change(document):
+        document["metrics"][name] *= factor
+
+    return change
+
+
+def nudge_piece(document):
+    document["pieces"][3]["transform"][3] += 5
+
+
+def mirror_piece(document):
+    matrix = np.array(document["pieces"][3]["transform"]).reshape(4, 4) @ np.diag([1, 1, -1, 1])
+    document["pieces"][3]["transform"] = matrix.ravel().tolist()
+
+
+def drop_joint(document):
+    document["joints"].pop()
+
+
+def swap_steps(document):
+    steps = document["assembly"]
+    steps[1]["face"], steps[-1]["face"] = steps[-1]["face"], steps[1]["face"]
+
+
+def other_status(document):
+    document["outcome"]["status"] = "stalled" if document["outcome"]["status"] == "converged" else "converged"
+
+
+def one_part_more(document):
+    document["classes"][0]["parts"][0]["count"] += 1
+
+
+def farther(document):
+    document["metrics"]["hausdorff"]["surface_assembled"]["max_percent"] += 0.1
+
+
+@pytest.mark.parametrize(
+    ("change", "name"),
+    [
+        (metric("error_max", 0.9), "largest error, mm"),
+        (metric("error_mean_percent", 1.01), "mean error, %"),
+        (metric("mean_edge", 1.001), "mean edge, mm"),
+        (nudge_piece, "placement"),
+        (mirror_piece, "placement"),
+        (drop_joint, "joints"),
+        (swap_steps, "assembly order"),
+        (other_status, "outcome"),
+        (one_part_more, "counts"),
+        (farther, "d_H surface_assembled max, %"),
+    ],
+)
+def test_a_false_statement_is_found(copy, change, name):
+    edit(copy, change)
+    assert name in failures(copy)
+
+
+def test_a_surface_with_a_hole_is_found(copy, kit):
+    (copy / "surface.ply").write_bytes(ply_bytes(kit.surface.submesh(np.arange(1, len(kit.surface.faces)))))
+    assert "surface.ply is one closed surface" in failures(copy)
+
+
+def test_a_part_that_is_no_solid_is_found(copy, kit):
+    mesh = kit.part_set.parts[0].solid.mesh()
+    file = next((copy / "parts").glob("A*.stl"))
+    file.write_bytes(stl_bytes(TriMesh(mesh.vertices, mesh.faces[1:])))
+    assert "parts are solids" in failures(copy)
+
+
+def test_a_parts_list_that_miscounts_is_found(copy):
+    rows = json.loads((copy / "bom.json").read_text())
+    rows[0]["count"] += 1
+    (copy / "bom.json").write_text(json.dumps(rows))
+    assert "parts list" in failures(copy)
+
+
+@pytest.mark.parametrize("name", ["kit.json", "assembled.ply", "bom.json"])
+@pytest.mark.parametrize("how", ["missing", "broken"])
+def test_a_missing_or_broken_file_is_named(copy, name, how):
+    if how == "missing":
+        (copy / name).unlink()
+    else:
+        (copy / name).write_bytes(b"{nonsense")
+    with pytest.raises(KitFolderError) as caught:
+        verify_kit(copy)
+    assert caught.value.exit_status == 2
+    assert "kit" in str(caught.value)
+
+
+def test_assembled_without_classes_is_refused(copy, kit):
+    (copy / "assembled.ply").write_bytes(ply_bytes(kit.decomposition.mesh))
+    with pytest.raises(KitFolderError, match="piece_class"):
+        verify_kit(copy)
