@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from voxel_shapes import ball
+from voxel_shapes import ball, volume_of
 
+from drkid.intersection import self_intersections
+from drkid.spec import KitSpec
+from drkid.surface import extract_surface
 from drkid.surface.marching_cubes import grid_surface
-from drkid.surface.staircase import REACH_VOXELS, faired, smoothed_distance
+from drkid.surface.staircase import REACH_VOXELS, faired, smoothed_distance, uncrossed
 
 ONES = np.ones(3)
 
@@ -35,3 +38,25 @@ def test_fairing_keeps_the_volume_and_lessens_the_bend():
     smooth = mesh.moved(faired(mesh, np.array(mesh.vertices), np.array(mesh.vertices), ONES))
     assert smooth.volume == pytest.approx(mesh.volume, rel=0.01)
     assert smooth.areas.sum() < 0.97 * mesh.areas.sum()
+
+
+def test_faces_that_cut_others_go_back_and_the_rest_stays():
+    mesh, _ = grid_surface(ball())
+    safe, pushed = np.array(mesh.vertices), np.array(mesh.vertices)
+    through = int(pushed[:, 0].argmax())
+    pushed[through, 0] -= 30
+    assert len(self_intersections(mesh.moved(pushed)))
+    vertices = uncrossed(mesh, pushed, safe, ONES)
+    assert not len(self_intersections(mesh.moved(vertices)))
+    np.testing.assert_array_equal(vertices, safe)
+    gentle = faired(mesh, safe, safe, ONES)
+    np.testing.assert_array_equal(uncrossed(mesh, gentle, safe, ONES), gentle)
+
+
+def test_thin_sheets_do_not_cross_themselves():
+    sheet = np.zeros((20, 20, 20), bool)
+    height = np.rint(9 + 2 * np.sin(np.indices((14, 14)).sum(axis=0) / 1.5)).astype(int)
+    for (x, y), z in np.ndenumerate(height):
+        sheet[x + 3, y + 3, z : z + 1 + (x * y) % 2] = True
+    surface = extract_surface(volume_of(sheet), KitSpec())
+    assert not len(self_intersections(surface.mesh))

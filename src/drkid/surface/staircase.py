@@ -3,6 +3,7 @@
 import numpy as np
 import scipy.ndimage as ndi
 
+from drkid.intersection import self_intersections
 from drkid.mesh import Bools, Floats, TriMesh
 from drkid.surface.marching_cubes import neighbour_mean, slid
 
@@ -16,11 +17,11 @@ def without_staircase(mesh: TriMesh, mask: Bools, spacing: Floats) -> tuple[Floa
     """(V, 3) in voxel indices: the surface without the staircase, and the largest displacement in voxels.
 
     First the vertices slide along their grid edges to the zero of a smoothed distance: no voxel changes sides, so
-    none moves by more than half an edge. Then bounded fairing.
+    none moves by more than half an edge. Then bounded fairing, taken back where it made faces cut one another.
     """
     start = slid(mesh, np.where(mask, np.float32(1), np.float32(-1)))
-    field = smoothed_distance(mask, spacing)
-    vertices = faired(mesh, slid(mesh, field), start, spacing)
+    on_edges = slid(mesh, smoothed_distance(mask, spacing))
+    vertices = uncrossed(mesh, faired(mesh, on_edges, start, spacing), on_edges, spacing)
     return vertices, float(np.linalg.norm(vertices - start, axis=1).max())
 
 
@@ -50,3 +51,18 @@ def faired(mesh: TriMesh, vertices: Floats, start: Floats, spacing: Floats) -> F
         length = np.linalg.norm(move, axis=1, keepdims=True)
         vertices = start + move * np.minimum(1.0, REACH_VOXELS / np.maximum(length, REACH_VOXELS))
     return vertices
+
+
+def uncrossed(mesh: TriMesh, vertices: Floats, safe: Floats, spacing: Floats) -> Floats:
+    """(V, 3): `vertices`, but `safe` at the corners of faces that cut others, until no such face has moved from there.
+
+    In sheets of one to three voxels fairing can take two sides through one another; vertices on their own grid edges
+    cannot meet.
+    """
+    vertices = vertices.copy()
+    while True:
+        cutting = np.unique(mesh.faces[self_intersections(mesh.moved(vertices * spacing))])
+        back = cutting[(vertices[cutting] != safe[cutting]).any(axis=1)]
+        if not back.size:
+            return vertices
+        vertices[back] = safe[back]
