@@ -9,6 +9,7 @@ import json
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -28,6 +29,8 @@ from drkid.parts import make_parts
 from drkid.solid import Solid
 
 HERE = Path(__file__).parent
+RULES = ("bisector", "mean_normal", "perpendicular")
+SPECK_MM3 = 0.01  # overlaps below this are rounding
 VIEW = camera(-62, 34)
 STEEL = np.array([0.78, 0.79, 0.82])
 RED = np.array([0.86, 0.13, 0.13])
@@ -175,33 +178,47 @@ def read_stl(path: Path) -> TriMesh:
 def thickening() -> None:
     """Cuts through the same kit without connectors, thickened by the three rules; red where pieces overlap."""
     figure, axes = plt.subplots(1, 3, figsize=(10, 3.7), layout="constrained")
-    for axis, rule in zip(axes, ("bisector", "mean_normal", "perpendicular"), strict=True):
-        solids, colours, joints = thickened(rule)
-        overlaps = [solids[a] & solids[b] for a, b in joints]
-        depth = [overlap.volume for overlap in overlaps]
-        for solid, tint in zip(solids, colours, strict=True):
+    for axis, rule in zip(axes, RULES, strict=True):
+        found = thickened(rule)
+        for solid, tint in zip(found.solids, found.colours, strict=True):
             fill(axis, solid, tint)
-        for overlap in overlaps:
-            fill(axis, overlap, RED)
-        count, total = sum(volume > 0.01 for volume in depth), sum(depth) / 1000
-        axis.set_title(f"{rule}\n{count} of {len(joints)} joints overlap, {total:.2f} cm³ in all", fontsize=9)
+        for a, b in found.joints:
+            fill(axis, found.solids[a] & found.solids[b], RED)
+        count, volume = found.overlaps()
+        axis.set_title(f"{rule}\n{count} of {len(found.joints)} joints overlap, {volume / 1000:.1f} cm³", fontsize=9)
         axis.set(aspect="equal", xlim=(-112, 2), ylim=(-58, 62))
         axis.axis("off")
-        print(f"  {rule}: {count} of {len(joints)} overlap, {total:.3f} cm3")
     figure.savefig(HERE / "thickening.png", dpi=130)
 
 
-def thickened(rule: str) -> tuple[list[Solid], list[Floats], list[tuple[int, int]]]:
-    """The placed pieces, their colours and the pairs that share an edge; the cutting plane at z = 0."""
+@dataclass(frozen=True, eq=False)
+class Thickened:
+    """Placed pieces without connectors, the cutting plane at z = 0; pairs that share an edge, and their grooves."""
+
+    solids: list[Solid]
+    colours: list[Floats]
+    joints: list[tuple[int, int]]
+    groove_mm: Floats
+
+    def overlaps(self) -> tuple[int, float]:
+        """How many joints' pieces overlap, and the total volume in mm³."""
+        volumes = [(self.solids[a] & self.solids[b]).volume for a, b in self.joints]
+        return sum(volume > SPECK_MM3 for volume in volumes), sum(volumes)
+
+
+def thickened(rule: str) -> Thickened:
+    """The kit's pieces by another thickening."""
     made = nucleus_kit()
-    spec = made.spec.model_copy(update={"thickening": rule, "connector": "none"})
-    part_set = make_parts(made.decomposition, spec)
+    part_set = make_parts(made.decomposition, made.spec.model_copy(update={"thickening": rule, "connector": "none"}))
     found = assemble(made.decomposition.mesh, part_set)
     upright = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
     upright[:3, 3] = -upright[:3, :3] @ made.decomposition.mesh.vertices.mean(axis=0)
-    solids = [part_set.parts[piece.part].solid.moved(upright @ piece.transform) for piece in found.pieces]
-    colours = [colour(class_colour(part_set.parts[piece.part].class_index)) for piece in found.pieces]
-    return solids, colours, [joint.faces for joint in found.joints]
+    return Thickened(
+        [part_set.parts[piece.part].solid.moved(upright @ piece.transform) for piece in found.pieces],
+        [colour(class_colour(part_set.parts[piece.part].class_index)) for piece in found.pieces],
+        [joint.faces for joint in found.joints],
+        part_set.groove_mm,
+    )
 
 
 def fill(axis: Axes, solid: Solid, tint: Floats) -> None:

@@ -10,7 +10,7 @@ from drkid.intersection import self_intersections
 from drkid.spec import KitSpec
 from drkid.surface import extract_surface
 from drkid.surface.marching_cubes import grid_surface
-from drkid.surface.staircase import REACH_VOXELS, faired, smoothed_distance, uncrossed
+from drkid.surface.staircase import REACH_VOXELS, faired, near_thin_places, smoothed_distance, uncrossed
 
 ONES = np.ones(3)
 
@@ -60,3 +60,16 @@ def test_thin_sheets_do_not_cross_themselves():
         sheet[x + 3, y + 3, z : z + 1 + (x * y) % 2] = True
     surface = extract_surface(volume_of(sheet), KitSpec())
     assert not len(self_intersections(surface.mesh))
+
+
+def test_thin_places_are_walls_gaps_and_spikes_and_nothing_else():
+    mask = np.zeros((40, 20, 20), bool)
+    mask[4:16, 4:16, 4:16] = mask[18:30, 4:16, 4:16] = True  # a gap of two voxels
+    mask[16:18, 4:7, 4:7] = True  # bridged
+    mesh, _ = grid_surface(mask)
+    thin = near_thin_places(mesh, mask)
+    x, y, _ = mesh.corners.mean(axis=1).T
+    walls = np.isin(x, (15.5, 17.5)) & (y > 8)
+    assert walls.sum() > 100
+    assert thin[walls].all()
+    assert not thin[(x < 10) | (x > 24)].any()

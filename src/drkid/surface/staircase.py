@@ -21,7 +21,9 @@ def without_staircase(mesh: TriMesh, mask: Bools, spacing: Floats) -> tuple[Floa
     """
     start = slid(mesh, np.where(mask, np.float32(1), np.float32(-1)))
     on_edges = slid(mesh, smoothed_distance(mask, spacing))
-    vertices = uncrossed(mesh, faired(mesh, on_edges, start, spacing), on_edges, spacing)
+    vertices = faired(mesh, on_edges, start, spacing)
+    thin = TriMesh(mesh.vertices, mesh.faces[near_thin_places(mesh, mask)])
+    vertices = uncrossed(thin, vertices, on_edges, spacing)
     return vertices, float(np.linalg.norm(vertices - start, axis=1).max())
 
 
@@ -51,6 +53,19 @@ def faired(mesh: TriMesh, vertices: Floats, start: Floats, spacing: Floats) -> F
         length = np.linalg.norm(move, axis=1, keepdims=True)
         vertices = start + move * np.minimum(1.0, REACH_VOXELS / np.maximum(length, REACH_VOXELS))
     return vertices
+
+
+def near_thin_places(mesh: TriMesh, mask: Bools) -> Bools:
+    """(F,): faces at or near a wall, gap, spike or notch that holds no cube of three voxels.
+
+    Only there are two sides so close that fairing can take them through one another.
+    """
+    solid = mask.astype(np.uint8)
+    opened = ndi.maximum_filter(ndi.minimum_filter(solid, 3), 3)
+    closed = ndi.minimum_filter(ndi.maximum_filter(solid, 3), 3)
+    near = ndi.maximum_filter(closed - opened, 5)
+    at_vertex = near[tuple(np.rint(mesh.vertices).astype(np.int64).T)] > 0
+    return np.asarray(at_vertex[mesh.faces].any(axis=1))
 
 
 def uncrossed(mesh: TriMesh, vertices: Floats, safe: Floats, spacing: Floats) -> Floats:

@@ -1,0 +1,226 @@
+"""Fill the tables of the documentation, which stand between `<!-- table NAME -->` and `<!-- end -->`.
+
+    python docs/make_tables.py [NAME ...]
+
+`paper` and `choices` come from benchmarks/results; the others are made anew, from the bundled nucleus, by the examples
+and the command line.
+"""
+
+import contextlib
+import importlib.util
+import io
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from statistics import mean, median
+
+import drkid
+
+DOCS = Path(__file__).parent
+REPOSITORY = DOCS.parent
+RESULTS = REPOSITORY / "benchmarks" / "results"
+PAIRS = ("surface_simplified_percent", "simplified_assembled_percent", "surface_assembled_percent")
+SHAPES = {
+    "urocell_mito_bean.nii.gz": "mitochondrion",
+    "cells3d_nuclei_labels.ome.tif": "nucleus",
+    "asteroid_itokawa.obj": "Itokawa",
+}
+
+
+def table(head: list[str], rows: list[list[str]]) -> str:
+    """A Markdown table."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def fenced(text: str) -> str:
+    """Text as it was printed."""
+    lines = "\n".join(line.rstrip() for line in text.splitlines())
+    return f"```\n{lines}\n```"
+
+
+# ---- from benchmarks/results
+
+
+def paper() -> str:
+    """The paper's table, each row followed by drkid's."""
+    results = json.loads((RESULTS / "paper_table.json").read_text())
+    rows, reached = [], 0
+    for result in results:
+        theirs, ours = result["paper"], result["drkid"]
+        reached += ours["tolerance_percent"] <= theirs["tolerance_percent"]
+        rows.append([theirs["model"], *_figures(theirs)])
+        rows.append([f"– drkid: {ours['shape'].split('.')[0].replace('_', ' ')}", *_figures(ours)])
+    head = [
+        "model",
+        "faces",
+        "k",
+        "T %",
+        "mean %",
+        "d_H(M_i, M_s)",
+        "d_H(M_s, M_f)",
+        "d_H(M_i, M_f)",
+        "s",
+        "iterations",
+    ]
+    return f"{table(head, rows)}\n\ndrkid reaches the paper's T in {reached} of {len(results)} rows."
+
+
+def _figures(row: dict) -> list[str]:
+    distances = [f"{row[name][0]:.2f} / {row[name][1]:.2f}" for name in PAIRS]
+    error = f"{row['error_mean_percent']:.3f}"
+    faces, classes = str(row["faces_final"]), str(row["classes"])
+    return [
+        faces,
+        classes,
+        f"{row['tolerance_percent']:.2f}",
+        error,
+        *distances,
+        f"{row['seconds']:.1f}",
+        f"{row['iterations']}",
+    ]
+
+
+def choices() -> str:
+    """What the open choices do."""
+    rows = []
+    for row in json.loads((RESULTS / "pressure_choices.json").read_text())["rows"]:
+        runs = row["runs"]
+        reached = [run["tolerance_percent"] for run in runs]
+        pair = [mean(run["simplified_assembled_percent"][i] for run in runs) for i in (0, 1)]
+        rows.append(
+            [
+                f"{SHAPES[row['shape']]}, {row['faces_simplified']}",
+                row["choice"],
+                f"{median(reached):.2f} ({min(reached):.2f} – {max(reached):.2f})",
+                f"{mean(run['error_mean_percent'] for run in runs):.2f}",
+                f"{pair[0]:.2f} / {pair[1]:.2f}",
+                f"{mean(run['seconds'] for run in runs):.1f}",
+            ]
+        )
+    return table(["shape, faces", "choice", "T %", "mean error %", "d_H(M_s, M_f)", "s"], rows)
+
+
+# ---- made anew
+
+
+def faces() -> str:
+    """The nucleus with more and more faces."""
+    rows = []
+    for count in (80, 120, 172, 260, 400, 600):
+        kit = drkid.make_kit(spec=drkid.KitSpec(faces=count))
+        m = kit.metrics
+        rows.append(
+            [
+                str(m.pieces),
+                f"{m.error_max_percent:.2f} ({kit.decomposition.outcome.status})",
+                f"{m.surface_assembled.mean_percent:.2f} / {m.surface_assembled.max_percent:.2f}",
+                f"{kit.spec.size_mm:.0f}",
+                f"{m.mean_edge:.1f}",
+                f"{m.groove_mean_mm:.1f}",
+            ]
+        )
+    head = [
+        "faces",
+        "largest error %",
+        "distance to M_i, mean / max %",
+        "smallest size mm",
+        "mean edge mm",
+        "groove mm",
+    ]
+    return table(head, rows)
+
+
+def classes() -> str:
+    """What examples/classes_and_error.py prints."""
+    return _printed_by("classes_and_error")
+
+
+def processes() -> str:
+    """What examples/processes.py prints."""
+    return _printed_by("processes")
+
+
+def density() -> str:
+    """What examples/density_map.py prints."""
+    return _printed_by("density_map")
+
+
+def _printed_by(name: str) -> str:
+    spec = importlib.util.spec_from_file_location(name, REPOSITORY / "examples" / f"{name}.py")
+    example = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(example)
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        example.main()
+    return fenced(said.getvalue())
+
+
+def make() -> str:
+    """What `drkid make` says on standard output."""
+    with tempfile.TemporaryDirectory() as folder:
+        return _said("make", "--faces", "172", "--classes", "7", "--out", "nucleus-kit", folder=folder)
+
+
+def inspect() -> str:
+    """What `drkid inspect` says on standard output."""
+    return _said("inspect", folder=".")
+
+
+def _said(*arguments: str, folder: str) -> str:
+    command = [sys.executable, "-m", "drkid", *arguments]
+    environment = os.environ | {"COLUMNS": "110", "NO_COLOR": "1"}
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    if done.returncode not in (0, 3):
+        raise RuntimeError(done.stderr)
+    return fenced(done.stdout.replace(f"{Path(folder).resolve()}{os.sep}", ""))
+
+
+def thickening() -> str:
+    """How many joints overlap under each rule, and by how much; and the grooves."""
+    sys.path.insert(0, str(DOCS / "figures"))
+    import make_figures  # noqa: PLC0415 — needs the extra `figures`, which no other table does
+
+    rows = []
+    for rule in make_figures.RULES:
+        found = make_figures.thickened(rule)
+        count, volume = found.overlaps()
+        rows.append(
+            [
+                f"`{rule}`",
+                f"{count} of {len(found.joints)}",
+                f"{volume / 1000:.1f}",
+                f"{found.groove_mm.mean():.1f} / {found.groove_mm.max():.1f}",
+            ]
+        )
+    return table(["thickening", "joints that overlap", "overlap cm³", "groove mm, mean / max"], rows)
+
+
+TABLES = {
+    made.__name__: made for made in (paper, choices, faces, classes, processes, density, make, inspect, thickening)
+}
+
+
+def filled(page: str, name: str, content: Callable[[], str]) -> str:
+    """The page with the table of this name made anew, if it has one."""
+    start = f"<!-- table {name} -->"
+    if start not in page:
+        return page
+    block = f"{start}\n\n{content()}\n\n<!-- end -->"
+    return re.sub(rf"{re.escape(start)}.*?<!-- end -->", lambda _: block, page, count=1, flags=re.DOTALL)
+
+
+def main() -> None:
+    """Fill the named tables, or all."""
+    for name in sys.argv[1:] or TABLES:
+        for path in sorted(DOCS.rglob("*.md")):
+            path.write_text(filled(path.read_text(), name, TABLES[name]))
+        print(name, flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,178 @@
+"""The quadratic rigidity model: what a change of labels or an edge flip would cost, without solving again.
+
+Around a mesh x the best small move y for given labels minimises
+
+    |J y − b|² + w² (o + N y)ᵀ K (o + N y) + μ² |y|²,   b = L[labels] − lengths,
+
+with the rigidity matrix J, the offsets o from the target along its normals N, and K = I + β² ΛᵀΛ. Its Hessian
+H = JᵀJ + w² NᵀKN + μ² I is inverted once and kept dense. With the residual g = b − J y at the minimiser y:
+
+* changing the wanted lengths by D changes the minimum by 2 Σ D_i g_i + Σ D_i D_j (δ_ij − J_i H⁻¹ J_jᵀ);
+* taking row k out of J changes it by −g_k² / (1 − J_k H⁻¹ J_kᵀ), and putting another in by the like of it.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from drkid.mesh import Bools, Floats, Ints, TriMesh
+
+
+class Connectivity(NamedTuple):
+    """A closed mesh in arrays that kernels change.
+
+    `faces` and `face_edges` (F, 3): side i of a face runs from its corner i to the next; `edges`, `edge_faces` (E, 2);
+    `valence` (V,); `joined` (V, V).
+    """
+
+    faces: Ints
+    face_edges: Ints
+    edges: Ints
+    edge_faces: Ints
+    valence: Ints
+    joined: Bools
+
+
+class QuadraticModel(NamedTuple):
+    """What pricing needs, all changed in place as moves are taken.
+
+    `inverse` H⁻¹ (3V, 3V); `coupling` J H⁻¹ Jᵀ (E, E); `shift` the minimiser y (3V,); `residual` g (E,); of each edge
+    its unit vector `direction` (E, 3) and `length` (E,) at the positions (V, 3) where the model was made.
+    """
+
+    inverse: Floats
+    coupling: Floats
+    shift: Floats
+    residual: Floats
+    direction: Floats
+    length: Floats
+    position: Floats
+
+
+def connectivity(mesh: TriMesh) -> Connectivity:
+    """Writable connectivity of a closed mesh."""
+    joined = np.zeros((len(mesh.vertices),) * 2, np.bool_)
+    joined[mesh.edges[:, 0], mesh.edges[:, 1]] = joined[mesh.edges[:, 1], mesh.edges[:, 0]] = True
+    arrays = (mesh.faces, mesh.face_edges, mesh.edges, mesh.edge_faces, mesh.valence)
+    return Connectivity(*(array.copy() for array in arrays), joined)
+
+
+@njit(cache=True)
+def compliance(inverse, a, da, b, db):
+    """J_a H⁻¹ J_bᵀ of two edges, given their ends (pairs) and unit vectors."""
+    i, j, k, m = 3 * a[0], 3 * a[1], 3 * b[0], 3 * b[1]
+    total = 0.0
+    for r in range(3):
+        for s in range(3):
+            total += (
+                da[r]
+                * db[s]
+                * (inverse[i + r, k + s] - inverse[i + r, m + s] - inverse[j + r, k + s] + inverse[j + r, m + s])
+            )
+    return total
+
+
+@njit(cache=True)
+def push(inverse, shift, ends, direction, force):
+    """Add H⁻¹ J_eᵀ `force` to `shift`: the answer of the whole mesh to a change of one wanted length."""
+    for r in range(3):
+        head, tail = inverse[3 * ends[1] + r], inverse[3 * ends[0] + r]
+        factor = force * direction[r]
+        for i in range(len(shift)):
+            shift[i] += factor * (head[i] - tail[i])
+
+
+@njit(cache=True)
+def stretch(shift, ends, direction):
+    """J_e y: the first-order change of an edge's length."""
+    total = 0.0
+    for r in range(3):
+        total += direction[r] * (shift[3 * ends[1] + r] - shift[3 * ends[0] + r])
+    return total
+
+
+@njit(cache=True)
+def price_of_labels(model, lengths, labels, changed, new, count):
+    """Change of the minimum if `count` edges in `changed` get the labels `new` in place of `labels` (E,)."""
+    total = 0.0
+    for p in range(count):
+        e = changed[p]
+        step = lengths[new[p]] - lengths[labels[e]]
+        total += step * (2 * model.residual[e] + step)
+        for q in range(count):
+            f = changed[q]
+            total -= step * (lengths[new[q]] - lengths[labels[f]]) * model.coupling[e, f]
+    return total
+
+
+@njit(cache=True)
+def take_label(model, edges, e, step):
+    """Let the wanted length of edge e grow by `step`."""
+    row = model.coupling[e]
+    for f in range(len(row)):
+        model.residual[f] -= step * row[f]
+    model.residual[e] += step
+    push(model.inverse, model.shift, edges[e], model.direction[e], step)
+
+
+class FlipPrice(NamedTuple):
+    """Change of the minimum, and the forces that carry the minimiser: out of the old row, into the new one."""
+
+    price: float
+    release: float
+    load: float
+
+
+@njit(cache=True)
+def price_of_flip(softness, across, own, old_residual, new_residual):
+    """Take a row out of J and put another in.
+
+    `softness` is 1 − J_k H⁻¹ J_kᵀ of the old row k, `own` J_m H⁻¹ J_mᵀ of the new row m, `across` J_m H⁻¹ J_kᵀ, and
+    the residuals are theirs at the present minimiser.
+    """
+    if softness < 1e-9:  # without this edge the model would be singular
+        return FlipPrice(np.inf, 0.0, 0.0)
+    misfit = new_residual + across * old_residual / softness
+    price = misfit * misfit / (1.0 + own + across * across / softness) - old_residual * old_residual / softness
+    return FlipPrice(price, -old_residual / softness, misfit)
+
+
+@njit(cache=True)
+def _add_outer(matrix, column, factor):
+    """matrix += factor · column columnᵀ."""
+    for i in range(len(column)):
+        scaled = factor * column[i]
+        row = matrix[i]
+        for j in range(len(column)):
+            row[j] += scaled * column[j]
+
+
+@njit(cache=True)
+def take_flip(model, edges, k, ends, direction, length, found):
+    """Take row k out and put in that of the edge with these ends; `found` is the flip's price (Sherman–Morrison)."""
+    count, size = len(model.length), len(model.shift)
+    pull, sag = model.coupling[k].copy(), np.zeros(size)
+    push(model.inverse, sag, edges[k], model.direction[k], 1.0)
+    softness = 1.0 - pull[k]
+    _add_outer(model.inverse, sag, 1.0 / softness)
+    _add_outer(model.coupling, pull, 1.0 / softness)
+    for i in range(size):
+        model.shift[i] += found.release * sag[i]
+    for e in range(count):
+        model.residual[e] -= found.release * pull[e]
+    sag[:] = 0
+    push(model.inverse, sag, ends, direction, 1.0)
+    stiffness = 1.0 + stretch(sag, ends, direction)
+    for e in range(count):
+        pull[e] = stretch(sag, edges[e], model.direction[e])
+    _add_outer(model.inverse, sag, -1.0 / stiffness)
+    _add_outer(model.coupling, pull, -1.0 / stiffness)
+    for i in range(size):
+        model.shift[i] += found.load / stiffness * sag[i]
+    for e in range(count):
+        model.residual[e] -= found.load / stiffness * pull[e]
+        model.coupling[k, e] = model.coupling[e, k] = pull[e] / stiffness
+    model.coupling[k, k] = 1.0 - 1.0 / stiffness
+    model.residual[k] = found.load / stiffness
+    model.direction[k], model.length[k] = direction, length
