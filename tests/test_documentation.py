@@ -6,6 +6,7 @@ import tomllib
 
 import pytest
 from conftest import REPOSITORY
+from scripts import load_script
 
 from drkid import KitSpec, __version__
 from drkid.cli import app
@@ -91,6 +92,14 @@ def test_python_compiles(text):
 @pytest.mark.parametrize("text", fences("toml"))
 def test_toml_is_a_spec(text):
     assert KitSpec.parse(tomllib.loads(text))
+
+
+@pytest.mark.parametrize("name", ["paper", "choices"])
+def test_tables_are_those_of_the_benchmarks(name):
+    tables = load_script(REPOSITORY / "docs" / "make_tables.py")
+    page = (REPOSITORY / "docs" / "comparison-with-the-paper.md").read_text()
+    assert f"<!-- table {name} -->" in page
+    assert tables.filled(page, name, tables.TABLES[name]) == page
 
 
 def test_citation():

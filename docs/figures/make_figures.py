@@ -113,7 +113,7 @@ def convergence() -> None:
     left.semilogy(iterations, [r.error_max_percent for r in records], color=class_colour(6), lw=0.9, label="largest")
     left.semilogy(iterations, [r.error_mean_percent for r in records], color=class_colour(2), lw=0.9, label="mean")
     left.axhline(made.spec.tolerance_percent, color="0.4", lw=0.8, ls="--")
-    left.annotate("tolerance", (0, made.spec.tolerance_percent), ha="left", va="top", color="0.4")
+    left.annotate("tolerance", (0.75 * iterations[-1], made.spec.tolerance_percent), ha="center", va="top", color="0.4")
     left.set(xlabel="iteration", ylabel="error, % of the mean edge")
     left.legend(frameon=False)
     right.semilogy(iterations, [record.energy for record in records], color=class_colour(0), lw=0.9)
@@ -188,7 +188,7 @@ def thickening() -> None:
         axis.set_title(f"{rule}\n{count} of {len(found.joints)} joints overlap, {volume / 1000:.1f} cm³", fontsize=9)
         axis.set(aspect="equal", xlim=(-112, 2), ylim=(-58, 62))
         axis.axis("off")
-    figure.savefig(HERE / "thickening.png", dpi=130)
+    figure.savefig(HERE / "thickening.png", dpi=130, bbox_inches="tight", pad_inches=0.1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -91,6 +91,16 @@ class KitSpec(BaseModel):
     tolerance_percent: float = _field(
         1.5, "Congruence", "Largest error of a piece that counts as converged, in percent of the mean edge.", gt=0
     )
+    seconds: float | None = _field(
+        None, "Congruence", "Time for the palette solver; by the number of faces when not given.", gt=0
+    )
+    rounds: int | None = _field(
+        None, "Congruence", "Rounds of the palette solver in place of a time: the same rounds make the same kit.", ge=1
+    )
+    weight_mean: float = _field(1.0, "Congruence", "Weight of the mean distance in choosing an exact mesh.", ge=0)
+    weight_max: float = _field(1.0, "Congruence", "Weight of the largest distance.", ge=0)
+    weight_dihedral: float = _field(0.5, "Congruence", "Weight of dihedral angles beyond the surface's own.", ge=0)
+    weight_concave: float = _field(0.25, "Congruence", "Weight of concave edges beyond the surface's own.", ge=0)
     limit: float = _field(
         0.25, "Congruence", "How far a vertex may leave the surface, in mean edges (pressure solver).", gt=0, le=2
     )

@@ -1,0 +1,132 @@
+"""Starts and hops: anneal softly, then solve exactly (basin hopping, Wales and Doye 1997).
+
+A start anneals labels and flips at falling weights of the shape. A hop softens an exact mesh, anneals it gently and
+solves it again; what comes out is another exact mesh nearby, or none.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drkid.congruence import newton
+from drkid.congruence.annealing import Schedule, anneal
+from drkid.congruence.framework import Framework, framework_of
+from drkid.congruence.levenberg_marquardt import Freedom, linearised, solve
+from drkid.congruence.palette import Palette
+from drkid.congruence.quadratic_model import QuadraticModel, connectivity
+from drkid.congruence.rigidity import edge_vectors, rigidity_matrix
+from drkid.congruence.target import Target
+from drkid.mesh import Ints
+
+START_WEIGHTS = (1.0, 0.6, 0.4, 0.25)
+START_DAMPING, START_HEAT, START_STEPS_PER_FACE = 0.05, 3.0, 1200
+EXACT_WEIGHTS, EXACT_ITERATIONS = (0.1, 0.03, 0.01), 6
+HOP_WEIGHT, HOP_DAMPING, HOP_HEAT, HOP_STEPS = (0.1, 0.3), (0.02, 0.1), (0.05, 0.8), 15_000
+HOP_EXACT_WEIGHT, HOP_ITERATIONS = 0.03, 5
+FLIP_SHARE = 0.3
+LOCAL_VERTICES = 30  # around the vertex of a local hop
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What stays the same: the target in units of the mean edge, the palette, and what of its lengths is free."""
+
+    target: Target
+    palette: Palette
+    freedom: Freedom
+    square: bool
+    """As many lengths as freedoms (genus 0): Newton applies; else only the least residual can be sought."""
+
+
+@dataclass(frozen=True)
+class Anneal:
+    """How softly: weight w of the shape, damping μ, heat (first temperature in typical prices), steps."""
+
+    weight: float
+    damping: float
+    heat: float
+    steps: int
+
+
+def quadratic_model(frame: Framework, target: Target, weight: float, damping: float) -> QuadraticModel:
+    """The model of `quadratic_model` at a framework."""
+    at = linearised(frame, target, weight)
+    hessian = at.hessian
+    hessian[np.diag_indices_from(hessian)] += damping**2
+    inverse = np.linalg.inv(hessian)
+    inverse = (inverse + inverse.T) / 2
+    jacobian = rigidity_matrix(frame.mesh.vertices, frame.mesh.edges)
+    direction, length = edge_vectors(frame.mesh.vertices, frame.mesh.edges)
+    shift = -inverse @ at.gradient
+    coupling = jacobian @ inverse @ jacobian.T
+    return QuadraticModel(
+        inverse,
+        np.ascontiguousarray((coupling + coupling.T) / 2),
+        shift,
+        frame.wanted - length - jacobian @ shift,
+        direction,
+        length,
+        frame.mesh.vertices.copy(),
+    )
+
+
+def annealed(
+    frame: Framework, problem: Problem, how: Anneal, rng: np.random.Generator, active: Ints | None = None
+) -> Framework:
+    """Labels and flips annealed in the quadratic model; positions stay. Only `active` edges change, or all."""
+    model, net = quadratic_model(frame, problem.target, how.weight, how.damping), connectivity(frame.mesh)
+    labels = frame.labels.copy()
+    free = np.ones(len(labels), np.bool_)
+    if active is not None:
+        free[:] = False
+        free[active] = True
+    spread = float((1 - np.diag(model.coupling)).mean() * (frame.lengths[-1] - frame.lengths[0]) ** 2)
+    schedule = Schedule(how.heat * spread, how.steps, FLIP_SHARE, np.flatnonzero(free), free)
+    anneal(net, model, labels, frame.lengths, problem.palette.allowed.copy(), rng, schedule)
+    return framework_of(frame.mesh.vertices, net.faces, net.edges, labels, frame.lengths)
+
+
+def start(frame: Framework, problem: Problem, rng: np.random.Generator) -> Framework:
+    """From first labels to a soft framework: annealed twice at each weight, the ratio of lengths held."""
+    held: Freedom = "none" if problem.freedom == "none" else "scale"
+    for weight in START_WEIGHTS:
+        for _ in range(2):
+            how = Anneal(weight, START_DAMPING, START_HEAT, START_STEPS_PER_FACE * len(frame.mesh.faces))
+            frame, _ = solve(annealed(frame, problem, how, rng), problem.target, weight, held, 4)
+    return frame
+
+
+def exactly(frame: Framework, problem: Problem, weights: tuple[float, ...] = EXACT_WEIGHTS) -> Framework:
+    """The true solve: Levenberg–Marquardt at falling weights, then Newton where the system is square."""
+    for weight in weights:
+        frame, _ = solve(frame, problem.target, weight, problem.freedom, EXACT_ITERATIONS)
+    return newton.exact(frame, problem.freedom) if problem.square else frame
+
+
+def hop(frame: Framework, problem: Problem, rng: np.random.Generator, active: Ints | None = None) -> Framework:
+    """Soften, anneal gently, solve again. `worst` of the result tells whether it is exact."""
+    weight, damping, heat = (float(np.exp(rng.uniform(*np.log(r)))) for r in (HOP_WEIGHT, HOP_DAMPING, HOP_HEAT))
+    soft, _ = solve(frame, problem.target, weight, problem.freedom, 4)
+    soft = annealed(soft, problem, Anneal(weight, damping, heat, HOP_STEPS), rng, active)
+    soft, _ = solve(soft, problem.target, weight, problem.freedom, 4)
+    soft, _ = solve(soft, problem.target, HOP_EXACT_WEIGHT, problem.freedom, HOP_ITERATIONS)
+    return newton.exact(soft, problem.freedom) if problem.square else soft
+
+
+def edges_around(frame: Framework, centre: int, count: int = LOCAL_VERTICES) -> Ints:
+    """Edges among the `count` vertices nearest to a vertex along edges, breadth first."""
+    neighbours: list[list[int]] = [[] for _ in range(len(frame.mesh.vertices))]
+    for a, b in frame.mesh.edges.tolist():
+        neighbours[a].append(b)
+        neighbours[b].append(a)
+    seen, queue = {centre}, [centre]
+    for v in queue:
+        if len(queue) >= count:
+            break
+        for n in neighbours[v]:
+            if n not in seen:
+                seen.add(n)
+                queue.append(n)
+    inside = np.zeros(len(neighbours), np.bool_)
+    inside[queue] = True
+    return np.flatnonzero(inside[frame.mesh.edges].all(axis=1))

@@ -1,0 +1,207 @@
+"""The palette solver: few edge lengths, labelled, annealed and solved until every edge has its length exactly.
+
+Works in units of M_s's mean edge. First a few starts, of which the best is kept, then rounds of hops from the best mesh
+so far. The work of a round depends on the seed and its number alone, so that the same rounds make the same kit on any
+machine; the clock only decides how many there are.
+"""
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from drkid.congruence.framework import Framework
+from drkid.congruence.hop import Problem, edges_around, exactly, hop, start
+from drkid.congruence.labelling import nearest_labels, repaired
+from drkid.congruence.palette import Palette, palette_of_classes
+from drkid.congruence.score import Yardstick
+from drkid.congruence.solver import Candidate
+from drkid.congruence.target import Target
+from drkid.congruence.triangle_space import ascending_lengths, clustering_error
+from drkid.errors import SpecError
+from drkid.intersection import self_intersections
+from drkid.kit import Convergence, Outcome
+from drkid.mesh import TriMesh, read_only
+from drkid.spec import KitSpec
+
+EXACT = 1e-9  # largest edge error, of the mean edge, that counts as exact
+START_RATIOS = (1.17, 1.15, 1.19)  # of two lengths, tried in turn
+STARTS, TASKS_PER_ROUND = 6, 4
+LABEL_TRIALS = 20
+WANDER = 0.7  # chance to go on from a hop that was not exact, while nothing is
+SECONDS_PER_FACE = 0.06
+LOCAL_SHARE = 0.3  # of the hops
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A framework with its score; `exact` ones come before others, whatever their scores."""
+
+    frame: Framework
+    exact: bool
+    score: float
+
+    @property
+    def rank(self) -> tuple[bool, float]:
+        """For comparison, less being better."""
+        return not self.exact, self.score
+
+
+@dataclass(frozen=True, eq=False)
+class PaletteState:
+    """The best mesh so far, where the search stands, and what the rounds have told."""
+
+    scale: float
+    problem: Problem
+    yardstick: Yardstick
+    found: Found
+    standing: tuple[Framework, ...]
+    round: int
+    began: float
+    history: tuple[Convergence, ...]
+
+    @property
+    def iteration(self) -> int:
+        """Rounds done."""
+        return self.round
+
+    @cached_property
+    def best(self) -> Candidate:
+        """The best mesh in the unit that M_s came in, with its classes."""
+        frame = self.found.frame
+        mesh = frame.mesh.scaled(self.scale)
+        face_class = self.problem.palette.class_of(frame.labels[frame.mesh.face_edges])
+        lengths = np.array([[frame.lengths[i] for i in m] for m in self.problem.palette.multisets]) * self.scale
+        error = clustering_error(ascending_lengths(mesh), face_class, lengths).maximum
+        return Candidate(mesh, read_only(face_class), read_only(lengths), error)
+
+
+@dataclass(frozen=True)
+class PaletteSolver:
+    """Solver of the protocol `congruence.solver.Solver`; `surface` is M_i, the target."""
+
+    spec: KitSpec
+    surface: TriMesh
+
+    def init(self, mesh: TriMesh) -> PaletteState:
+        """The starts, in parallel, and the best of them.
+
+        Raises:
+            SpecError: no labelling of this mesh has only allowed triangles.
+        """
+        began, scale = time.monotonic(), mesh.mean_edge
+        unit = mesh.scaled(1 / scale)
+        problem = Problem(
+            Target(self.surface.scaled(1 / scale)),
+            palette_of_classes(self.spec.classes),
+            "all" if mesh.genus == 0 else "none",
+            mesh.genus == 0,
+        )
+        yardstick = Yardstick(unit, self.spec)
+
+        def begin(number: int) -> tuple[Framework, Found]:
+            rng = np.random.default_rng([self.spec.seed, 0, number])
+            soft = start(first_frame(unit, problem.palette, number, rng), problem, rng)
+            return soft, _judged(exactly(soft, problem), yardstick)
+
+        with threadpool_limits(1):
+            results = _in_parallel([lambda n=n: begin(n) for n in range(STARTS)])
+        softs = sorted(results, key=lambda pair: pair[1].rank)
+        best = softs[0][1]
+        state = PaletteState(
+            scale, problem, yardstick, best, tuple(soft for soft, _ in softs[:TASKS_PER_ROUND]), 0, began, ()
+        )
+        return replace(state, history=(_recorded(state),))
+
+    def step(self, state: PaletteState) -> PaletteState:
+        """One round: hops from the best exact mesh, or from where each search stands while none is exact."""
+        standing = (state.found.frame,) * TASKS_PER_ROUND if state.found.exact else state.standing
+
+        def leap(number: int) -> Found:
+            rng = np.random.default_rng([self.spec.seed, state.round + 1, number])
+            frame = standing[number % len(standing)]
+            active = _somewhere(frame, rng) if rng.random() < LOCAL_SHARE else None
+            try:
+                return _judged(hop(frame, state.problem, rng, active), state.yardstick)
+            except np.linalg.LinAlgError:  # this hop broke the mesh: it is not taken
+                return Found(frame, False, np.inf)
+
+        with threadpool_limits(1):
+            results = _in_parallel([lambda n=n: leap(n) for n in range(TASKS_PER_ROUND)])
+        best = min([state.found, *results], key=lambda found: found.rank)
+        rng = np.random.default_rng([self.spec.seed, state.round + 1, TASKS_PER_ROUND])
+        wandered = tuple(
+            found.frame if np.isfinite(found.score) and rng.random() < WANDER else old
+            for old, found in zip(standing, results, strict=False)
+        )
+        state = replace(state, found=best, standing=wandered, round=state.round + 1)
+        return replace(state, history=(_recorded(state),))
+
+    def finished(self, state: PaletteState) -> Outcome | None:
+        """When the rounds or the seconds are used up."""
+        if self.fraction(state) < 1:
+            return None
+        percent = 100 * state.best.error / state.best.mesh.mean_edge
+        after = f"after {state.round} rounds in {time.monotonic() - state.began:.1f} s"
+        if state.found.exact:
+            return Outcome("converged", f"exact: largest error {percent:.1g} % {after}")
+        status = "converged" if percent <= self.spec.tolerance_percent else "stalled"
+        return Outcome(status, f"not exact: largest error {percent:.3g} % {after}; more --seconds or --classes help")
+
+    def fraction(self, state: PaletteState) -> float:
+        """Rounds or seconds used, of those given."""
+        if self.spec.rounds is not None:
+            return state.round / self.spec.rounds
+        seconds = self.spec.seconds or max(10.0, SECONDS_PER_FACE * len(state.best.mesh.faces))
+        return (time.monotonic() - state.began) / seconds
+
+
+def first_frame(mesh: TriMesh, palette: Palette, number: int, rng: np.random.Generator) -> Framework:
+    """Nearest labels, repaired, with lengths of the palette's ratios that keep the mean edge.
+
+    Raises:
+        SpecError: the repair finds no allowed labelling.
+    """
+    if palette.size == 2:
+        palette = replace(palette, ratios=(1.0, START_RATIOS[number % len(START_RATIOS)]))
+    lengths = np.array(palette.ratios) * (mesh.mean_edge / np.mean(palette.ratios))
+    for _ in range(LABEL_TRIALS):
+        labels = repaired(mesh, nearest_labels(mesh, lengths), palette, lengths, rng)
+        if labels is not None:
+            return Framework(mesh, labels, palette.lengths(mesh.mean_edge, labels))
+    raise SpecError(
+        "no labelling of this mesh has only allowed triangles",
+        wanted=f"triangles of {len(palette.multisets)} kinds",
+        found=f"none after {LABEL_TRIALS} trials",
+        remedy="other --classes or --faces",
+    )
+
+
+def _judged(frame: Framework, yardstick: Yardstick) -> Found:
+    exact = frame.worst < EXACT and (np.diff(frame.lengths) > 0).all() and len(self_intersections(frame.mesh)) == 0
+    quality = yardstick.score(yardstick.quality(frame.mesh))
+    return Found(frame, bool(exact), quality if exact else quality + 100 * frame.worst)
+
+
+def _somewhere(frame: Framework, rng: np.random.Generator) -> np.ndarray:
+    """Edges around a vertex, drawn by how much is amiss there."""
+    amiss = np.bincount(frame.mesh.edges.ravel(), np.repeat(frame.residual**2, 2), len(frame.mesh.vertices)) + 1e-12
+    return edges_around(frame, int(rng.choice(len(amiss), p=amiss / amiss.sum())))
+
+
+def _recorded(state: PaletteState) -> Convergence:
+    best = state.best
+    error = clustering_error(ascending_lengths(best.mesh), best.face_class, best.class_lengths)
+    percent = 100 / best.mesh.mean_edge
+    return Convergence(state.round, error.energy, error.maximum * percent, error.mean * percent)
+
+
+def _in_parallel(tasks: Sequence[Callable[[], object]]) -> list:
+    """Results in the order of the tasks, whatever the number of processors."""
+    with ThreadPoolExecutor(min(len(tasks), os.cpu_count() or 1)) as pool:
+        return [future.result() for future in [pool.submit(task) for task in tasks]]
