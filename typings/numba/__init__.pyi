@@ -7,7 +7,13 @@ F = TypeVar("F", bound=Callable[..., Any])
 def njit(function: F) -> F: ...
 @overload
 def njit(
-    *, cache: bool = ..., fastmath: bool | set[str] = ..., parallel: bool = ..., nogil: bool = ..., inline: str = ...
+    *,
+    cache: bool = ...,
+    fastmath: bool | set[str] = ...,
+    parallel: bool = ...,
+    nogil: bool = ...,
+    inline: str = ...,
+    _nrt: bool = ...,
 ) -> Callable[[F], F]: ...
 
 prange = range

@@ -11,7 +11,10 @@ import numpy as np
 from numba import njit
 
 from drkid.congruence.quadratic_model import (
+    Connectivity,
     FlipPrice,
+    Move,
+    QuadraticModel,
     compliance,
     price_of_flip,
     price_of_labels,
@@ -39,21 +42,14 @@ class Schedule(NamedTuple):
     free: Bools
 
 
-class Move(NamedTuple):
-    """Room for a proposal: edges to relabel and their new labels (8,)."""
-
-    edge: Ints
-    label: Ints
-
-
-@njit(cache=True)
-def _draw(rng, count):
+@njit(cache=True, inline="always")
+def _draw(rng: np.random.Generator, count: int) -> int:
     """A whole number in [0, count)."""
     return int(rng.random() * count)
 
 
-@njit(cache=True)
-def side_of(net, face, edge):
+@njit(cache=True, inline="always")
+def side_of(net: Connectivity, face: int, edge: int) -> int:
     """Which side of a face an edge is."""
     for i in range(3):
         if net.face_edges[face, i] == edge:
@@ -61,22 +57,22 @@ def side_of(net, face, edge):
     return -1
 
 
-@njit(cache=True)
-def face_is_allowed(net, labels, allowed, face):
+@njit(cache=True, inline="always")
+def face_is_allowed(net: Connectivity, labels: Ints, allowed: Bools, face: int) -> bool:
     """Are the labels of a face one of the multisets?"""
     a, b, c = net.face_edges[face]
     return allowed[labels[a], labels[b], labels[c]]
 
 
-@njit(cache=True)
-def _other(rng, label, count):
+@njit(cache=True, inline="always")
+def _other(rng: np.random.Generator, label: int, count: int) -> int:
     """A label different from the given one."""
     drawn = _draw(rng, count - 1)
     return drawn if drawn < label else drawn + 1
 
 
-@njit(cache=True)
-def _propose_swap(net, labels, rng, schedule, move):
+@njit(cache=True, inline="always")
+def _propose_swap(net: Connectivity, labels: Ints, rng: np.random.Generator, schedule: Schedule, move: Move) -> int:
     face = net.edge_faces[schedule.active[_draw(rng, len(schedule.active))], _draw(rng, 2)]
     i = _draw(rng, 3)
     a, b = net.face_edges[face, i], net.face_edges[face, (i + 1) % 3]
@@ -87,8 +83,10 @@ def _propose_swap(net, labels, rng, schedule, move):
     return 2
 
 
-@njit(cache=True)
-def _propose_around(net, labels, rng, schedule, move, lengths):
+@njit(cache=True, inline="always")
+def _propose_around(
+    net: Connectivity, labels: Ints, rng: np.random.Generator, schedule: Schedule, move: Move, lengths: Floats
+) -> int:
     """Two or three of the five edges of two neighbouring faces."""
     centre = schedule.active[_draw(rng, len(schedule.active))]
     wanted, count = 2 + _draw(rng, 2), 0
@@ -103,8 +101,10 @@ def _propose_around(net, labels, rng, schedule, move, lengths):
     return count
 
 
-@njit(cache=True)
-def _propose(net, labels, rng, schedule, move, lengths):
+@njit(cache=True, inline="always")
+def _propose(
+    net: Connectivity, labels: Ints, rng: np.random.Generator, schedule: Schedule, move: Move, lengths: Floats
+) -> int:
     """Fill `move` with a relabelling; how many edges it changes, 0 for none."""
     kind = rng.random()
     if kind < SINGLE:
@@ -121,15 +121,15 @@ def _propose(net, labels, rng, schedule, move, lengths):
     return count
 
 
-@njit(cache=True)
-def _exchange(labels, move, count):
+@njit(cache=True, inline="always")
+def _exchange(labels: Ints, move: Move, count: int) -> None:
     """Put the move's labels in and take the old ones out; called again it takes the move back."""
     for i in range(count):
         labels[move.edge[i]], move.label[i] = move.label[i], labels[move.edge[i]]
 
 
-@njit(cache=True)
-def _is_allowed(net, labels, allowed, move, count, skip, skip2):
+@njit(cache=True, inline="always")
+def _is_allowed(net: Connectivity, labels: Ints, allowed: Bools, move: Move, count: int, skip: int, skip2: int) -> bool:
     """Do all faces at the move's edges have allowed labels, two faces left out?"""
     for i in range(count):
         for side in range(2):
@@ -139,21 +139,33 @@ def _is_allowed(net, labels, allowed, move, count, skip, skip2):
     return True
 
 
-@njit(cache=True)
-def _accepts(rng, price, temperature):
+@njit(cache=True, inline="always")
+def _accepts(rng: np.random.Generator, price: float, temperature: float) -> bool:
     return price <= 0 or rng.random() < np.exp(-price / temperature)
 
 
-@njit(cache=True)
-def _take_labels(net, model, labels, lengths, move, count):
+@njit(cache=True, inline="always")
+def _take_labels(
+    net: Connectivity, model: QuadraticModel, labels: Ints, lengths: Floats, move: Move, count: int
+) -> None:
     for i in range(count):
         e = move.edge[i]
         take_label(model, net.edges, e, lengths[move.label[i]] - lengths[labels[e]])
         labels[e] = move.label[i]
 
 
-@njit(cache=True)
-def _relabel(net, model, labels, lengths, allowed, rng, schedule, move, temperature):
+@njit(cache=True, inline="always")
+def _relabel(
+    net: Connectivity,
+    model: QuadraticModel,
+    labels: Ints,
+    lengths: Floats,
+    allowed: Bools,
+    rng: np.random.Generator,
+    schedule: Schedule,
+    move: Move,
+    temperature: float,
+) -> float:
     """One relabelling step; the change of the energy, 0 where it was not taken."""
     count = _propose(net, labels, rng, schedule, move, lengths)
     if count == 0:
@@ -175,8 +187,10 @@ def _relabel(net, model, labels, lengths, allowed, rng, schedule, move, temperat
 QUAD = ((1, 2), (2, 0), (0, 3), (3, 1))  # the sides of the quadrilateral a b c d: bc, ca, ad, db
 
 
-@njit(cache=True)
-def quad_of(net, edge):
+@njit(cache=True, inline="always")
+def quad_of(
+    net: Connectivity, edge: int
+) -> tuple[tuple[int, int, int, int], tuple[int, int], tuple[int, int, int, int]]:
     """Corners a, b (ends of the edge), c, d (opposite), its faces, and its sides bc, ca, ad, db.
 
     The first face is (a, b, c), the second (b, a, d).
@@ -190,8 +204,8 @@ def quad_of(net, edge):
     return (a, b, c, d), (f, g), (bc, ca, ad, db)
 
 
-@njit(cache=True)
-def flip(net, edge):
+@njit(cache=True, inline="always")
+def flip(net: Connectivity, edge: int) -> None:
     """Turn an edge in the quadrilateral of its faces: they become (a, d, c) and (d, b, c)."""
     (a, b, c, d), (f, g), (bc, ca, ad, db) = quad_of(net, edge)
     net.faces[f, 0], net.faces[f, 1], net.faces[f, 2] = a, d, c
@@ -212,15 +226,15 @@ def flip(net, edge):
     net.valence[d] += 1
 
 
-@njit(cache=True)
-def _cross(p, a, b, c):
+@njit(cache=True, inline="always")
+def _cross(p: Floats, a: int, b: int, c: int) -> tuple[float, float, float]:
     ux, uy, uz = p[b, 0] - p[a, 0], p[b, 1] - p[a, 1], p[b, 2] - p[a, 2]
     vx, vy, vz = p[c, 0] - p[a, 0], p[c, 1] - p[a, 1], p[c, 2] - p[a, 2]
     return uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
 
 
-@njit(cache=True)
-def flip_is_sound(net, position, lengths, corners):
+@njit(cache=True, inline="always")
+def flip_is_sound(net: Connectivity, position: Floats, lengths: Floats, corners: tuple[int, int, int, int]) -> bool:
     """Topology and shape allow the flip: valences, no doubled edge, length, angle across it, areas."""
     a, b, c, d = corners
     if min(net.valence[a], net.valence[b]) <= LEAST_VALENCE or max(net.valence[c], net.valence[d]) >= MOST_VALENCE:
@@ -238,8 +252,10 @@ def flip_is_sound(net, position, lengths, corners):
     return min(one, two) > LEAST_AREA * lengths[0] ** 2 and x * u + y * v + z * w > LEAST_COSINE * one * two
 
 
-@njit(cache=True)
-def _propose_beside(labels, rng, sides, move, lengths):
+@njit(cache=True, inline="always")
+def _propose_beside(
+    labels: Ints, rng: np.random.Generator, sides: tuple[int, int, int, int], move: Move, lengths: Floats
+) -> int:
     """Up to two sides of the quadrilateral to relabel with the flip."""
     drawn = rng.random()
     count = 0 if drawn < 0.5 or len(lengths) == 1 else 1 if drawn < 0.8 else 2
@@ -251,25 +267,58 @@ def _propose_beside(labels, rng, sides, move, lengths):
     return count
 
 
-@njit(cache=True)
-def _price_with_labels(net, model, labels, lengths, move, count, edge, ends, direction, length, label):
+@njit(cache=True, inline="always")
+def _lay(position: Floats, corners: tuple[int, int, int, int], move: Move) -> float:
+    """Ends and unit vector of the edge c d into `move`; its length."""
+    squared = 0.0
+    for r in range(3):
+        move.direction[r] = position[corners[3], r] - position[corners[2], r]
+        squared += move.direction[r] ** 2
+    length = np.sqrt(squared)
+    for r in range(3):
+        move.direction[r] /= length
+    move.ends[0], move.ends[1] = corners[2], corners[3]
+    return length
+
+
+@njit(cache=True, inline="always")
+def _price_with_labels(
+    net: Connectivity,
+    model: QuadraticModel,
+    labels: Ints,
+    lengths: Floats,
+    move: Move,
+    count: int,
+    edge: int,
+    length: float,
+    label: int,
+) -> FlipPrice:
     """Price of the labels beside, then of the flip under them."""
     price = price_of_labels(model, lengths, labels, move.edge, move.label, count)
     old = model.residual[edge]
-    new = lengths[label] - length - stretch(model.shift, ends, direction)
+    new = lengths[label] - length - stretch(model.shift, move.ends, move.direction)
     for i in range(count):
         e = move.edge[i]
         step = lengths[move.label[i]] - lengths[labels[e]]
         old -= step * model.coupling[edge, e]
-        new -= step * compliance(model.inverse, ends, direction, net.edges[e], model.direction[e])
-    across = compliance(model.inverse, ends, direction, net.edges[edge], model.direction[edge])
-    own = compliance(model.inverse, ends, direction, ends, direction)
+        new -= step * compliance(model.inverse, move.ends, move.direction, net.edges[e], model.direction[e])
+    across = compliance(model.inverse, move.ends, move.direction, net.edges[edge], model.direction[edge])
+    own = compliance(model.inverse, move.ends, move.direction, move.ends, move.direction)
     found = price_of_flip(1.0 - model.coupling[edge, edge], across, own, old, new)
     return FlipPrice(price + found.price, found.release, found.load)
 
 
-@njit(cache=True)
-def _labels_fit(net, labels, allowed, move, count, faces, sides, label):
+@njit(cache=True, inline="always")
+def _labels_fit(
+    net: Connectivity,
+    labels: Ints,
+    allowed: Bools,
+    move: Move,
+    count: int,
+    faces: tuple[int, int],
+    sides: tuple[int, int, int, int],
+    label: int,
+) -> bool:
     """Are the two new faces and all faces beside them allowed?"""
     bc, ca, ad, db = sides
     _exchange(labels, move, count)
@@ -279,16 +328,26 @@ def _labels_fit(net, labels, allowed, move, count, faces, sides, label):
     return fine
 
 
-@njit(cache=True)
-def _all_free(free, edge, sides):
+@njit(cache=True, inline="always")
+def _all_free(free: Bools, edge: int, sides: tuple[int, int, int, int]) -> bool:
     fine = free[edge]
     for side in sides:
         fine = fine and free[side]
     return fine
 
 
-@njit(cache=True)
-def _try_flip(net, model, labels, lengths, allowed, rng, schedule, move, temperature):
+@njit(cache=True, inline="always")
+def _try_flip(
+    net: Connectivity,
+    model: QuadraticModel,
+    labels: Ints,
+    lengths: Floats,
+    allowed: Bools,
+    rng: np.random.Generator,
+    schedule: Schedule,
+    move: Move,
+    temperature: float,
+) -> float:
     """One flip step; the change of the energy, 0 where it was not taken."""
     edge = schedule.active[_draw(rng, len(schedule.active))]
     corners, faces, sides = quad_of(net, edge)
@@ -298,28 +357,31 @@ def _try_flip(net, model, labels, lengths, allowed, rng, schedule, move, tempera
     count = _propose_beside(labels, rng, sides, move, lengths)
     if not _labels_fit(net, labels, allowed, move, count, faces, sides, label):
         return 0.0
-    ends, direction = np.array([corners[2], corners[3]]), np.empty(3)
-    for r in range(3):
-        direction[r] = model.position[corners[3], r] - model.position[corners[2], r]
-    length = np.sqrt(np.dot(direction, direction))
-    direction /= length
-    found = _price_with_labels(net, model, labels, lengths, move, count, edge, ends, direction, length, label)
+    length = _lay(model.position, corners, move)
+    found = _price_with_labels(net, model, labels, lengths, move, count, edge, length, label)
     if not _accepts(rng, found.price, temperature):
         return 0.0
     _take_labels(net, model, labels, lengths, move, count)
-    take_flip(model, net.edges, edge, ends, direction, length, found)
+    take_flip(model, net.edges, edge, length, found, move)
     flip(net, edge)
     labels[edge] = label
     return found.price
 
 
-@njit(cache=True, nogil=True)
-def anneal(net, model, labels, lengths, allowed, rng, schedule):
-    """Anneal in place; the change of the model's energy, and how many moves were taken."""
-    move = Move(np.empty(8, np.int64), np.empty(8, np.int64))
-    total, taken = 0.0, 0
-    for step in range(schedule.steps):
-        temperature = schedule.temperature * END ** (step / schedule.steps)
+@njit(cache=True, nogil=True, _nrt=False)
+def _anneal(
+    net: Connectivity,
+    model: QuadraticModel,
+    labels: Ints,
+    lengths: Floats,
+    allowed: Bools,
+    rng: np.random.Generator,
+    schedule: Schedule,
+    move: Move,
+) -> tuple[float, int]:
+    total, taken, temperature = 0.0, 0, schedule.temperature
+    cooling = END ** (1.0 / schedule.steps)
+    for _ in range(schedule.steps):
         if rng.random() < schedule.flips:
             change = _try_flip(net, model, labels, lengths, allowed, rng, schedule, move, temperature)
         else:
@@ -327,4 +389,41 @@ def anneal(net, model, labels, lengths, allowed, rng, schedule):
         if change != 0.0:
             total += change
             taken += 1
+        temperature *= cooling
     return total, taken
+
+
+def anneal(
+    net: Connectivity,
+    model: QuadraticModel,
+    labels: Ints,
+    lengths: Floats,
+    allowed: Bools,
+    rng: np.random.Generator,
+    schedule: Schedule,
+) -> tuple[float, int]:
+    """Anneal in place.
+
+    Args:
+        net: connectivity, which flips change.
+        model: the quadratic model, kept up to date.
+        labels: (E,) labels, changed.
+        lengths: (q,) the palette.
+        allowed: (q, q, q) which labels a face may have.
+        rng: every random choice comes from it.
+        schedule: temperatures, steps, and which edges may change.
+
+    Returns:
+        The change of the model's energy, and how many moves were taken.
+    """
+    move = Move(
+        np.empty(8, np.int64),
+        np.empty(8, np.int64),
+        np.empty(2, np.int64),
+        np.empty(3),
+        np.empty(len(model.length)),
+        np.empty(len(model.shift)),
+    )
+    # Without reference counting (no array is made inside) the loop runs six times faster: its helpers take tuples of
+    # arrays, and counting each of them at every access costs more than the work.
+    return _anneal(net, model, labels, lengths, allowed, rng, schedule, move)

@@ -63,13 +63,13 @@ def length_hessian(frame: Framework, direction: Floats) -> Floats:
     size = 3 * len(frame.mesh.vertices)
     block = (direction[:, :, None] * direction[:, None, :]).ravel()
     weights = np.concatenate([block, block, -block, -block])
-    return np.bincount(frame.hessian_index, weights, size * size).reshape(size, size)
+    return np.bincount(frame.hessian_index, weights, size * size).reshape(size, size).astype(np.float64, copy=False)
 
 
 def offset_hessian(frame: Framework, normals: Floats) -> Floats:
     """NᵀKN (3V, 3V)."""
-    size = 3 * len(normals)
-    return np.einsum("ia,ij,jb->iajb", normals, frame.stiffness, normals, optimize=True).reshape(size, size)
+    outer = normals.reshape(-1, 1) * normals.reshape(1, -1)
+    return outer * np.repeat(np.repeat(frame.stiffness, 3, axis=0), 3, axis=1)
 
 
 def merit(frame: Framework, offset: Floats, weight: float) -> float:
@@ -77,10 +77,12 @@ def merit(frame: Framework, offset: Floats, weight: float) -> float:
     return float(frame.residual @ frame.residual + weight**2 * offset @ frame.stiffness @ offset)
 
 
-def linearised(frame: Framework, target: Target, weight: float) -> Linearisation:
-    """Merit, gradient and Gauss–Newton Hessian by the vertices."""
+def linearised(
+    frame: Framework, target: Target, weight: float, offsets: tuple[Floats, Floats] | None = None
+) -> Linearisation:
+    """Merit, gradient and Gauss–Newton Hessian by the vertices; `offsets` where they are known already."""
     direction, _ = edge_vectors(frame.mesh.vertices, frame.mesh.edges)
-    offset, normals = target.offsets(frame.mesh.vertices)
+    offset, normals = target.offsets(frame.mesh.vertices) if offsets is None else offsets
     pull = (weight**2 * normals * (frame.stiffness @ offset)[:, None]).ravel()
     return Linearisation(
         merit(frame, offset, weight),
@@ -103,7 +105,8 @@ def solve(
     for _ in range(iterations):
         for _ in range(TRIALS):
             tried = _step(frame, at, freedom, damping)
-            value = merit(tried, target.offsets(tried.mesh.vertices)[0], weight)
+            offsets = target.offsets(tried.mesh.vertices)
+            value = merit(tried, offsets[0], weight)
             if value < at.merit:
                 break
             damping = max(30 * damping, 1e-4)
@@ -112,7 +115,7 @@ def solve(
         gain, frame = at.merit - value, tried
         if gain < LEAST_GAIN * value:
             return frame, value
-        at, damping = linearised(frame, target, weight), 0.2 * damping
+        at, damping = linearised(frame, target, weight, offsets), 0.2 * damping
     return frame, at.merit
 
 

@@ -58,8 +58,8 @@ def connectivity(mesh: TriMesh) -> Connectivity:
     return Connectivity(*(array.copy() for array in arrays), joined)
 
 
-@njit(cache=True)
-def compliance(inverse, a, da, b, db):
+@njit(cache=True, inline="always")
+def compliance(inverse: Floats, a: Ints, da: Floats, b: Ints, db: Floats) -> float:
     """J_a H⁻¹ J_bᵀ of two edges, given their ends (pairs) and unit vectors."""
     i, j, k, m = 3 * a[0], 3 * a[1], 3 * b[0], 3 * b[1]
     total = 0.0
@@ -73,8 +73,8 @@ def compliance(inverse, a, da, b, db):
     return total
 
 
-@njit(cache=True)
-def push(inverse, shift, ends, direction, force):
+@njit(cache=True, inline="always")
+def push(inverse: Floats, shift: Floats, ends: Ints, direction: Floats, force: float) -> None:
     """Add H⁻¹ J_eᵀ `force` to `shift`: the answer of the whole mesh to a change of one wanted length."""
     for r in range(3):
         head, tail = inverse[3 * ends[1] + r], inverse[3 * ends[0] + r]
@@ -83,8 +83,8 @@ def push(inverse, shift, ends, direction, force):
             shift[i] += factor * (head[i] - tail[i])
 
 
-@njit(cache=True)
-def stretch(shift, ends, direction):
+@njit(cache=True, inline="always")
+def stretch(shift: Floats, ends: Ints, direction: Floats) -> float:
     """J_e y: the first-order change of an edge's length."""
     total = 0.0
     for r in range(3):
@@ -92,8 +92,10 @@ def stretch(shift, ends, direction):
     return total
 
 
-@njit(cache=True)
-def price_of_labels(model, lengths, labels, changed, new, count):
+@njit(cache=True, inline="always")
+def price_of_labels(
+    model: QuadraticModel, lengths: Floats, labels: Ints, changed: Ints, new: Ints, count: int
+) -> float:
     """Change of the minimum if `count` edges in `changed` get the labels `new` in place of `labels` (E,)."""
     total = 0.0
     for p in range(count):
@@ -106,14 +108,28 @@ def price_of_labels(model, lengths, labels, changed, new, count):
     return total
 
 
-@njit(cache=True)
-def take_label(model, edges, e, step):
+@njit(cache=True, inline="always")
+def take_label(model: QuadraticModel, edges: Ints, e: int, step: float) -> None:
     """Let the wanted length of edge e grow by `step`."""
     row = model.coupling[e]
     for f in range(len(row)):
         model.residual[f] -= step * row[f]
     model.residual[e] += step
     push(model.inverse, model.shift, edges[e], model.direction[e], step)
+
+
+class Move(NamedTuple):
+    """Room for a proposal: edges to relabel and their new labels (8,), and the flipped edge's ends and unit vector.
+
+    `pull` (E,) and `sag` (3V,) are room for what taking a flip works out.
+    """
+
+    edge: Ints
+    label: Ints
+    ends: Ints
+    direction: Floats
+    pull: Floats
+    sag: Floats
 
 
 class FlipPrice(NamedTuple):
@@ -124,8 +140,8 @@ class FlipPrice(NamedTuple):
     load: float
 
 
-@njit(cache=True)
-def price_of_flip(softness, across, own, old_residual, new_residual):
+@njit(cache=True, inline="always")
+def price_of_flip(softness: float, across: float, own: float, old_residual: float, new_residual: float) -> FlipPrice:
     """Take a row out of J and put another in.
 
     `softness` is 1 − J_k H⁻¹ J_kᵀ of the old row k, `own` J_m H⁻¹ J_mᵀ of the new row m, `across` J_m H⁻¹ J_kᵀ, and
@@ -138,9 +154,9 @@ def price_of_flip(softness, across, own, old_residual, new_residual):
     return FlipPrice(price, -old_residual / softness, misfit)
 
 
-@njit(cache=True)
-def _add_outer(matrix, column, factor):
-    """matrix += factor · column columnᵀ."""
+@njit(cache=True, inline="always")
+def _add_outer(matrix: Floats, column: Floats, factor: float) -> None:
+    """Add factor · column columnᵀ."""
     for i in range(len(column)):
         scaled = factor * column[i]
         row = matrix[i]
@@ -148,31 +164,42 @@ def _add_outer(matrix, column, factor):
             row[j] += scaled * column[j]
 
 
-@njit(cache=True)
-def take_flip(model, edges, k, ends, direction, length, found):
-    """Take row k out and put in that of the edge with these ends; `found` is the flip's price (Sherman–Morrison)."""
-    count, size = len(model.length), len(model.shift)
-    pull, sag = model.coupling[k].copy(), np.zeros(size)
+@njit(cache=True, inline="always")
+def _clear(values: Floats) -> None:
+    for i in range(len(values)):
+        values[i] = 0.0
+
+
+@njit(cache=True, inline="always")
+def _add_row(model: QuadraticModel, pull: Floats, sag: Floats, factor: float, force: float) -> None:
+    """The rank-one change of H⁻¹ and J H⁻¹ Jᵀ, and the minimiser's answer to `force`."""
+    _add_outer(model.inverse, sag, factor)
+    _add_outer(model.coupling, pull, factor)
+    for i in range(len(sag)):
+        model.shift[i] += force * sag[i]
+    for e in range(len(pull)):
+        model.residual[e] -= force * pull[e]
+
+
+@njit(cache=True, inline="always")
+def take_flip(model: QuadraticModel, edges: Ints, k: int, length: float, found: FlipPrice, move: Move) -> None:
+    """Take row k out and put in that of the edge in `move`; `found` is the flip's price (Sherman and Morrison 1950)."""
+    pull, sag = move.pull, move.sag
+    for e in range(len(pull)):
+        pull[e] = model.coupling[k, e]
+    _clear(sag)
     push(model.inverse, sag, edges[k], model.direction[k], 1.0)
-    softness = 1.0 - pull[k]
-    _add_outer(model.inverse, sag, 1.0 / softness)
-    _add_outer(model.coupling, pull, 1.0 / softness)
-    for i in range(size):
-        model.shift[i] += found.release * sag[i]
-    for e in range(count):
-        model.residual[e] -= found.release * pull[e]
-    sag[:] = 0
-    push(model.inverse, sag, ends, direction, 1.0)
-    stiffness = 1.0 + stretch(sag, ends, direction)
-    for e in range(count):
+    _add_row(model, pull, sag, 1.0 / (1.0 - pull[k]), found.release)
+    _clear(sag)
+    push(model.inverse, sag, move.ends, move.direction, 1.0)
+    share = 1.0 / (1.0 + stretch(sag, move.ends, move.direction))
+    for e in range(len(pull)):
         pull[e] = stretch(sag, edges[e], model.direction[e])
-    _add_outer(model.inverse, sag, -1.0 / stiffness)
-    _add_outer(model.coupling, pull, -1.0 / stiffness)
-    for i in range(size):
-        model.shift[i] += found.load / stiffness * sag[i]
-    for e in range(count):
-        model.residual[e] -= found.load / stiffness * pull[e]
-        model.coupling[k, e] = model.coupling[e, k] = pull[e] / stiffness
-    model.coupling[k, k] = 1.0 - 1.0 / stiffness
-    model.residual[k] = found.load / stiffness
-    model.direction[k], model.length[k] = direction, length
+    _add_row(model, pull, sag, -share, share * found.load)
+    for e in range(len(pull)):
+        model.coupling[k, e] = model.coupling[e, k] = share * pull[e]
+    model.coupling[k, k] = 1.0 - share
+    model.residual[k] = share * found.load
+    model.length[k] = length
+    for r in range(3):
+        model.direction[k, r] = move.direction[r]
