@@ -62,7 +62,7 @@ def make_kit(source: str | Path | None = None, spec: KitSpec | None = None, prog
     with stage("remesh") as told:
         simplified = simplify(surface, spec, told)
     with stage("congruence") as told:
-        decomposition = decompose(simplified.mesh, spec, told)
+        decomposition = decompose(simplified.mesh, spec, told, surface.mesh)
     with stage("parts") as told:
         part_set = make_parts(decomposition, spec, told)
     scale = part_set.scale_mm_per_unit

@@ -61,7 +61,7 @@ def side_of(net: Connectivity, face: int, edge: int) -> int:
 def face_is_allowed(net: Connectivity, labels: Ints, allowed: Bools, face: int) -> bool:
     """Are the labels of a face one of the multisets?"""
     a, b, c = net.face_edges[face]
-    return allowed[labels[a], labels[b], labels[c]]
+    return bool(allowed[labels[a], labels[b], labels[c]])
 
 
 @njit(cache=True, inline="always")
@@ -96,7 +96,7 @@ def _propose_around(
         for i in range(count):
             fresh = fresh and move.edge[i] != edge
         if fresh:
-            move.edge[count], move.label[count] = edge, _other(rng, labels[edge], len(lengths))
+            move.edge[count], move.label[count] = edge, _other(rng, int(labels[edge]), len(lengths))
             count += 1
     return count
 
@@ -109,7 +109,7 @@ def _propose(
     kind = rng.random()
     if kind < SINGLE:
         edge = schedule.active[_draw(rng, len(schedule.active))]
-        move.edge[0], move.label[0] = edge, _other(rng, labels[edge], len(lengths))
+        move.edge[0], move.label[0] = edge, _other(rng, int(labels[edge]), len(lengths))
         count = 1
     elif kind < SWAP:
         count = _propose_swap(net, labels, rng, schedule, move)
@@ -150,7 +150,7 @@ def _take_labels(
 ) -> None:
     for i in range(count):
         e = move.edge[i]
-        take_label(model, net.edges, e, lengths[move.label[i]] - lengths[labels[e]])
+        take_label(model, net.edges, e, float(lengths[move.label[i]] - lengths[labels[e]]))
         labels[e] = move.label[i]
 
 
@@ -263,7 +263,7 @@ def _propose_beside(
     second = (first + (1 + _draw(rng, 3))) % 4
     for i in range(count):
         edge = sides[first] if i == 0 else sides[second]
-        move.edge[i], move.label[i] = edge, _other(rng, labels[edge], len(lengths))
+        move.edge[i], move.label[i] = edge, _other(rng, int(labels[edge]), len(lengths))
     return count
 
 

@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from drkid.congruence.palette_solver import PaletteSolver
 from drkid.congruence.pressure import PressureSolver
 from drkid.congruence.solver import Solution, run
-from drkid.congruence.triangle_space import ascending_lengths, class_means
+from drkid.congruence.triangle_space import ascending_lengths
 from drkid.errors import SpecError
 from drkid.kit import Decomposition
 from drkid.mesh import Floats, TriMesh, read_only
@@ -14,14 +15,17 @@ from drkid.spec import KitSpec
 ISOSCELES_PERCENT = 0.1  # of the mean edge: below it no process prints two sides as different
 
 
-def decompose(mesh: TriMesh, spec: KitSpec, progress: Progress = silent) -> Decomposition:
-    """Decompose a closed mesh M_s into `spec.classes` classes of alike triangles (the paper, algorithm 1).
+def decompose(
+    mesh: TriMesh, spec: KitSpec, progress: Progress = silent, surface: TriMesh | None = None
+) -> Decomposition:
+    """Decompose a closed mesh M_s into `spec.classes` classes of alike triangles.
 
-    Classes come out without empty ones, ordered by their edge lengths, and their lengths are their
-    members' means; two lengths nearer than `ISOSCELES_PERCENT` are made equal, unless the tolerance would break.
+    `spec.method` chooses the solver: the paper's `pressure` (algorithm 1), or the exact `palette`, which stays near
+    `surface` (M_i; M_s where None). Classes come out without empty ones, ordered by their edge lengths; two lengths
+    nearer than `ISOSCELES_PERCENT` are made equal, unless the tolerance would break.
 
     Raises:
-        SpecError: more classes than faces, or a solver that this version does not have.
+        SpecError: more classes than faces, or classes that the solver cannot make of this mesh.
     """
     if spec.classes > len(mesh.faces):
         raise SpecError(
@@ -30,14 +34,10 @@ def decompose(mesh: TriMesh, spec: KitSpec, progress: Progress = silent) -> Deco
             found=f"{spec.classes} classes, {len(mesh.faces)} faces",
             remedy="fewer --classes or more --faces",
         )
-    if spec.method != "pressure":
-        raise SpecError(
-            f"the {spec.method} solver is not part of this version",
-            wanted="a solver that is",
-            found=spec.method,
-            remedy="--method pressure",
-        )
-    solution = run(PressureSolver(spec), mesh, progress)
+    if spec.method == "palette":
+        solution = run(PaletteSolver(spec, mesh if surface is None else surface), mesh, progress)
+    else:
+        solution = run(PressureSolver(spec), mesh, progress)
     return _tidied(solution, spec.tolerance_percent)
 
 
@@ -45,13 +45,13 @@ def _tidied(solution: Solution, tolerance_percent: float) -> Decomposition:
     best = solution.best
     points = ascending_lengths(best.mesh)
     used, labels = np.unique(best.face_class, return_inverse=True)
-    means = class_means(points, labels.ravel(), len(used))
-    order = np.lexsort(means.T[::-1])  # by the shortest side, then the middle one
+    exact = best.class_lengths[used]
+    order = np.lexsort(exact.T[::-1])  # by the shortest side, then the middle one
     face_class = np.argsort(order)[labels.ravel()].astype(np.int64)
-    lengths = _isosceles(means[order], best.mesh.mean_edge)
+    lengths = _isosceles(exact[order], best.mesh.mean_edge)
     errors = np.linalg.norm(points - lengths[face_class], axis=1)
     if 100 * errors.max() / best.mesh.mean_edge > tolerance_percent and solution.outcome.status == "converged":
-        lengths = means[order]
+        lengths = exact[order]
         errors = np.linalg.norm(points - lengths[face_class], axis=1)
     return Decomposition(
         mesh=best.mesh,

@@ -128,6 +128,6 @@ def _step(frame: Framework, at: Linearisation, freedom: Freedom, damping: float)
     both = cho_solve(factor, np.column_stack([coupling, at.gradient]), check_finite=False)
     schur = columns.T @ columns - coupling.T @ both[:, :-1]
     schur[np.diag_indices_from(schur)] += 1e-9
-    step = np.linalg.solve(schur, columns.T @ frame.residual + coupling.T @ both[:, -1])
+    step = np.asarray(np.linalg.solve(schur, columns.T @ frame.residual + coupling.T @ both[:, -1]), np.float64)
     shift = -both[:, -1] - both[:, :-1] @ step
     return frame.moved(frame.mesh.vertices + shift.reshape(-1, 3), changed_lengths(frame, freedom, step))

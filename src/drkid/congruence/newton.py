@@ -1,7 +1,7 @@
-"""Minimum-norm Newton on the edge lengths alone: exact, and quadratically convergent unless the mesh sits at a fold.
+"""Minimum-norm Newton on the edge lengths alone: exact, and of quadratic convergence unless at a fold.
 
-Each step is the smallest dx with J dx = L[labels] − len(x); the palette's free unknowns take part with a weight of their
-own (Deuflhard 2004, section 4.4, on underdetermined Newton methods).
+Each step is the smallest dx with J dx = L[labels] − len(x); the palette's free unknowns take part with a weight of
+their own (Deuflhard 2004, section 4.4, on underdetermined Newton methods).
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """The palette: few lengths, and the multisets of them that a triangle may have.
 
 Lengths are named by ascending letters: s and l of two, a, b, c of three (numbers 0, 1, 2). A palette of q lengths makes
-at most C(q + 2, 3) classes of triangles; with two lengths each of them is isosceles, so that one mould serves both hands.
+at most C(q + 2, 3) classes of triangles; with two lengths each is isosceles, so that one mould serves both hands.
 """
 
 from dataclasses import dataclass

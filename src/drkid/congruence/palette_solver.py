@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -19,23 +20,25 @@ from drkid.congruence.framework import Framework
 from drkid.congruence.hop import Problem, edges_around, exactly, hop, start
 from drkid.congruence.labelling import nearest_labels, repaired
 from drkid.congruence.palette import Palette, palette_of_classes
-from drkid.congruence.score import Yardstick
+from drkid.congruence.score import Quality, Yardstick
 from drkid.congruence.solver import Candidate
 from drkid.congruence.target import Target
 from drkid.congruence.triangle_space import ascending_lengths, clustering_error
 from drkid.errors import SpecError
 from drkid.intersection import self_intersections
 from drkid.kit import Convergence, Outcome
-from drkid.mesh import TriMesh, read_only
+from drkid.mesh import Ints, TriMesh, read_only
 from drkid.spec import KitSpec
 
 EXACT = 1e-9  # largest edge error, of the mean edge, that counts as exact
 START_RATIOS = (1.17, 1.15, 1.19)  # of two lengths, tried in turn
 STARTS, TASKS_PER_ROUND = 6, 4
 LABEL_TRIALS = 20
+UNIT_ERROR = 100.0  # a mesh that is not exact is the better, the smaller its largest error
 WANDER = 0.7  # chance to go on from a hop that was not exact, while nothing is
 SECONDS_PER_FACE = 0.06
 LOCAL_SHARE = 0.3  # of the hops
+R = TypeVar("R")
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +48,7 @@ class Found:
     frame: Framework
     exact: bool
     score: float
+    quality: Quality
 
     @property
     def rank(self) -> tuple[bool, float]:
@@ -70,9 +74,13 @@ class PaletteState:
         """Rounds done."""
         return self.round
 
-    @cached_property
+    @property
     def best(self) -> Candidate:
         """The best mesh in the unit that M_s came in, with its classes."""
+        return self._best
+
+    @cached_property
+    def _best(self) -> Candidate:
         frame = self.found.frame
         mesh = frame.mesh.scaled(self.scale)
         face_class = self.problem.palette.class_of(frame.labels[frame.mesh.face_edges])
@@ -111,7 +119,7 @@ class PaletteSolver:
 
         with threadpool_limits(1):
             results = _in_parallel([lambda n=n: begin(n) for n in range(STARTS)])
-        softs = sorted(results, key=lambda pair: pair[1].rank)
+        softs = sorted(results, key=_rank_of_start)
         best = softs[0][1]
         state = PaletteState(
             scale, problem, yardstick, best, tuple(soft for soft, _ in softs[:TASKS_PER_ROUND]), 0, began, ()
@@ -129,11 +137,11 @@ class PaletteSolver:
             try:
                 return _judged(hop(frame, state.problem, rng, active), state.yardstick)
             except np.linalg.LinAlgError:  # this hop broke the mesh: it is not taken
-                return Found(frame, False, np.inf)
+                return replace(state.found, frame=frame, exact=False, score=np.inf)
 
         with threadpool_limits(1):
             results = _in_parallel([lambda n=n: leap(n) for n in range(TASKS_PER_ROUND)])
-        best = min([state.found, *results], key=lambda found: found.rank)
+        best = min([state.found, *results], key=_rank)
         rng = np.random.default_rng([self.spec.seed, state.round + 1, TASKS_PER_ROUND])
         wandered = tuple(
             found.frame if np.isfinite(found.score) and rng.random() < WANDER else old
@@ -144,14 +152,28 @@ class PaletteSolver:
 
     def finished(self, state: PaletteState) -> Outcome | None:
         """When the rounds or the seconds are used up."""
-        if self.fraction(state) < 1:
-            return None
-        percent = 100 * state.best.error / state.best.mesh.mean_edge
-        after = f"after {state.round} rounds in {time.monotonic() - state.began:.1f} s"
+        return None if self.fraction(state) < 1 else self._outcome(state, "")
+
+    def interrupted(self, state: PaletteState) -> Outcome:
+        """The best so far is an answer at any time."""
+        return self._outcome(state, ", ended by hand")
+
+    def _outcome(self, state: PaletteState, why: str) -> Outcome:
+        percent = state.best.percent
+        after = f"after {state.round} rounds in {time.monotonic() - state.began:.1f} s{why}"
         if state.found.exact:
             return Outcome("converged", f"exact: largest error {percent:.1g} % {after}")
         status = "converged" if percent <= self.spec.tolerance_percent else "stalled"
         return Outcome(status, f"not exact: largest error {percent:.3g} % {after}; more --seconds or --classes help")
+
+    def told(self, state: PaletteState) -> str:
+        """Exact or not, T, d_H and the 95th percentile of the dihedrals."""
+        quality = state.found.quality
+        word = "exact" if state.found.exact else f"T {state.best.percent:.2g} %"
+        return (
+            f"round {state.round}: {word}, d_H {quality.mean_percent:.2f}/{quality.max_percent:.1f} %, "
+            f"dihedral p95 {quality.p95_degrees:.0f}°"
+        )
 
     def fraction(self, state: PaletteState) -> float:
         """Rounds or seconds used, of those given."""
@@ -169,7 +191,8 @@ def first_frame(mesh: TriMesh, palette: Palette, number: int, rng: np.random.Gen
     """
     if palette.size == 2:
         palette = replace(palette, ratios=(1.0, START_RATIOS[number % len(START_RATIOS)]))
-    lengths = np.array(palette.ratios) * (mesh.mean_edge / np.mean(palette.ratios))
+    ratios = np.array(palette.ratios)
+    lengths = ratios * float(mesh.mean_edge / ratios.mean())
     for _ in range(LABEL_TRIALS):
         labels = repaired(mesh, nearest_labels(mesh, lengths), palette, lengths, rng)
         if labels is not None:
@@ -182,13 +205,22 @@ def first_frame(mesh: TriMesh, palette: Palette, number: int, rng: np.random.Gen
     )
 
 
+def _rank(found: Found) -> tuple[bool, float]:
+    return found.rank
+
+
+def _rank_of_start(pair: tuple[Framework, Found]) -> tuple[bool, float]:
+    return pair[1].rank
+
+
 def _judged(frame: Framework, yardstick: Yardstick) -> Found:
     exact = frame.worst < EXACT and (np.diff(frame.lengths) > 0).all() and len(self_intersections(frame.mesh)) == 0
-    quality = yardstick.score(yardstick.quality(frame.mesh))
-    return Found(frame, bool(exact), quality if exact else quality + 100 * frame.worst)
+    quality = yardstick.quality(frame.mesh)
+    score = yardstick.score(quality)
+    return Found(frame, bool(exact), score if exact else score + UNIT_ERROR * frame.worst, quality)
 
 
-def _somewhere(frame: Framework, rng: np.random.Generator) -> np.ndarray:
+def _somewhere(frame: Framework, rng: np.random.Generator) -> Ints:
     """Edges around a vertex, drawn by how much is amiss there."""
     amiss = np.bincount(frame.mesh.edges.ravel(), np.repeat(frame.residual**2, 2), len(frame.mesh.vertices)) + 1e-12
     return edges_around(frame, int(rng.choice(len(amiss), p=amiss / amiss.sum())))
@@ -201,7 +233,7 @@ def _recorded(state: PaletteState) -> Convergence:
     return Convergence(state.round, error.energy, error.maximum * percent, error.mean * percent)
 
 
-def _in_parallel(tasks: Sequence[Callable[[], object]]) -> list:
+def _in_parallel(tasks: Sequence[Callable[[], R]]) -> list[R]:
     """Results in the order of the tasks, whatever the number of processors."""
     with ThreadPoolExecutor(min(len(tasks), os.cpu_count() or 1)) as pool:
         return [future.result() for future in [pool.submit(task) for task in tasks]]

@@ -107,6 +107,14 @@ class PressureSolver:
             f"iterations: {why}",
         )
 
+    def interrupted(self, state: PressureState) -> None:  # noqa: ARG002 — the protocol's signature
+        """A mesh half-way is no answer: nothing is kept."""
+        return
+
+    def told(self, state: PressureState) -> str:
+        """Iterations and the largest error."""
+        return f"iteration {state.iteration}, largest error {state.best.percent:.3g} %"
+
     def fraction(self, state: PressureState) -> float:
         """Iterations done, of the most that are allowed."""
         return state.iteration / self.spec.max_iterations

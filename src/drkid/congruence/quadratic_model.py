@@ -54,8 +54,14 @@ def connectivity(mesh: TriMesh) -> Connectivity:
     """Writable connectivity of a closed mesh."""
     joined = np.zeros((len(mesh.vertices),) * 2, np.bool_)
     joined[mesh.edges[:, 0], mesh.edges[:, 1]] = joined[mesh.edges[:, 1], mesh.edges[:, 0]] = True
-    arrays = (mesh.faces, mesh.face_edges, mesh.edges, mesh.edge_faces, mesh.valence)
-    return Connectivity(*(array.copy() for array in arrays), joined)
+    return Connectivity(
+        mesh.faces.copy(),
+        mesh.face_edges.copy(),
+        mesh.edges.copy(),
+        mesh.edge_faces.copy(),
+        mesh.valence.copy(),
+        joined,
+    )
 
 
 @njit(cache=True, inline="always")
@@ -105,7 +111,7 @@ def price_of_labels(
         for q in range(count):
             f = changed[q]
             total -= step * (lengths[new[q]] - lengths[labels[f]]) * model.coupling[e, f]
-    return total
+    return float(total)
 
 
 @njit(cache=True, inline="always")

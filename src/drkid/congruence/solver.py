@@ -17,6 +17,11 @@ class Candidate:
     class_lengths: Floats
     error: float
 
+    @property
+    def percent(self) -> float:
+        """The largest error in percent of the mean edge."""
+        return 100 * self.error / self.mesh.mean_edge
+
 
 class State(Protocol):
     """What a solver carries from step to step."""
@@ -55,6 +60,14 @@ class Solver(Protocol[S]):
         """Why to stop, or None to go on."""
         ...
 
+    def interrupted(self, state: S) -> Outcome | None:
+        """What to say when the search is ended by hand; None where the best so far is no answer."""
+        ...
+
+    def told(self, state: S) -> str:
+        """How far the solver is, in words."""
+        ...
+
     def fraction(self, state: S) -> float:
         """How far the solver is, in [0, 1], for a progress bar."""
         ...
@@ -71,12 +84,21 @@ class Solution:
 
 
 def run(solver: Solver[S], mesh: TriMesh, progress: Progress) -> Solution:
-    """Step until the solver is finished; an interruption of the process passes through."""
+    """Step until the solver is finished.
+
+    An interruption (Ctrl-C) ends the search of an anytime solver, whose best mesh so far is the answer; of another
+    solver it passes through, and so does a second one.
+    """
     state = solver.init(mesh)
     convergence = list(state.history)
     while (outcome := solver.finished(state)) is None:
-        state = solver.step(state)
+        try:
+            state = solver.step(state)
+        except KeyboardInterrupt:
+            outcome = solver.interrupted(state)
+            if outcome is None:
+                raise
+            break
         convergence.extend(state.history)
-        percent = 100 * state.best.error / state.best.mesh.mean_edge
-        progress(f"iteration {state.iteration}, largest error {percent:.3g} %", solver.fraction(state))
+        progress(solver.told(state), min(solver.fraction(state), 1.0))
     return Solution(state.best, outcome, state.iteration, tuple(convergence))
