@@ -8,9 +8,10 @@ import pytest
 import trimesh
 from hypothesis import settings
 
-from drkid.kit import Kit
+from drkid.kit import Kit, Source, Surface
 from drkid.mesh import TriMesh
 from drkid.pipeline import make_kit
+from drkid.remesh import simplify
 from drkid.spec import KitSpec
 
 settings.register_profile("drkid", deadline=None, derandomize=True)  # the first call may compile
@@ -28,13 +29,24 @@ def shared_data() -> Path:
     return folder
 
 
-@pytest.fixture(scope="session")
-def potato() -> TriMesh:
-    """A smooth closed surface of 320 faces, genus 0, neither round nor symmetric."""
-    sphere = trimesh.creation.icosphere(subdivisions=2)
+def potato_of(subdivisions: int) -> TriMesh:
+    """A smooth closed surface, genus 0, neither round nor symmetric."""
+    sphere = trimesh.creation.icosphere(subdivisions=subdivisions)
     x, y, z = np.asarray(sphere.vertices).T
     radius = 1 + 0.15 * np.sin(2 * x + 1) + 0.1 * np.cos(3 * y * z) + 0.08 * x * z
     return TriMesh(np.stack([1.4 * x, y, 0.9 * z], axis=1) * radius[:, None], np.asarray(sphere.faces))
+
+
+@pytest.fixture(scope="session")
+def potato() -> TriMesh:
+    """The potato with 320 faces."""
+    return potato_of(2)
+
+
+@pytest.fixture(scope="session")
+def pebble() -> TriMesh:
+    """The potato remeshed to 100 even faces: what a solver is given."""
+    return simplify(Surface(potato_of(4), Source("potato", "0" * 64)), KitSpec(faces=100)).mesh
 
 
 @pytest.fixture(scope="session")

@@ -1,8 +1,9 @@
 """Simulated annealing of edge labels and edge flips in the quadratic model (Kirkpatrick et al. 1983).
 
 Misfits are not rounded away one by one but cancel at a distance: error diffusion. A move changes one label, swaps two
-in a face, changes two or three around an edge, or flips an edge together with up to two labels beside it. Only moves
-that leave every touched face in the allowed multisets are priced.
+in a face, changes two or three around an edge, or flips an edge together with up to two labels beside it; where no
+label can change alone it exchanges labels along an alternating cycle. Only moves that leave every touched face in the
+allowed multisets are priced.
 """
 
 from typing import NamedTuple
@@ -10,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from drkid.congruence.alternating_cycle import LONGEST_CYCLE, cycle_share, propose_cycle
 from drkid.congruence.quadratic_model import (
     Connectivity,
     FlipPrice,
@@ -33,13 +35,17 @@ END = 1e-3  # last temperature, of the first
 
 
 class Schedule(NamedTuple):
-    """How to anneal: the first temperature, steps, share of flips; `active` edges (n,), and is an edge `free` (E,)?"""
+    """How to anneal: the first temperature, steps, share of flips; `active` edges (n,), and is an edge `free` (E,)?
+
+    `cycles` is the share of alternating cycles among the relabelling moves, at least what the palette needs.
+    """
 
     temperature: float
     steps: int
     flips: float
     active: Ints
     free: Bools
+    cycles: float = 0.0
 
 
 @njit(cache=True, inline="always")
@@ -106,6 +112,8 @@ def _propose(
     net: Connectivity, labels: Ints, rng: np.random.Generator, schedule: Schedule, move: Move, lengths: Floats
 ) -> int:
     """Fill `move` with a relabelling; how many edges it changes, 0 for none."""
+    if schedule.cycles > 0 and rng.random() < schedule.cycles:
+        return propose_cycle(net, labels, rng, schedule.active, schedule.free, move)
     kind = rng.random()
     if kind < SINGLE:
         edge = schedule.active[_draw(rng, len(schedule.active))]
@@ -417,13 +425,14 @@ def anneal(
         The change of the model's energy, and how many moves were taken.
     """
     move = Move(
-        np.empty(8, np.int64),
-        np.empty(8, np.int64),
+        np.empty(LONGEST_CYCLE, np.int64),
+        np.empty(LONGEST_CYCLE, np.int64),
         np.empty(2, np.int64),
         np.empty(3),
         np.empty(len(model.length)),
         np.empty(len(model.shift)),
     )
+    schedule = schedule._replace(cycles=max(schedule.cycles, cycle_share(allowed)))
     # Without reference counting (no array is made inside) the loop runs six times faster: its helpers take tuples of
     # arrays, and counting each of them at every access costs more than the work.
     return _anneal(net, model, labels, lengths, allowed, rng, schedule, move)

@@ -55,7 +55,7 @@ def transposed(direction: Floats, frame: Framework, values: Floats) -> Floats:
     force = direction[:, :, None] * columns[:, None, :]
     np.add.at(out, frame.mesh.edges[:, 1], force)
     np.subtract.at(out, frame.mesh.edges[:, 0], force)
-    return out.reshape(-1, *values.shape[1:])
+    return out.reshape(3 * len(out), *values.shape[1:])
 
 
 def length_hessian(frame: Framework, direction: Floats) -> Floats:

@@ -1,0 +1,320 @@
+"""One-sided repair of folds: relabelling that makes a mesh solvable where Newton's method stalls.
+
+A mesh sits at a fold where a singular value σ of its rigidity matrix J is nearly zero: the left vector y is then nearly
+a self-stress, the right one v a flex. Along such a slow mode the length equations read, to second order,
+
+    c = σ t + S t²,   c = yᵀ(L[labels] − length),   S = Σ_e y_e (|v_ab|² − (d_e · v_ab)²) / (2 length_e),
+
+with v_ab the difference of v at the ends of edge e and d_e its unit vector (second-order rigidity; Connelly and
+Whiteley 1996). There is a solution iff σ² + 4 S c ≥ 0, an inequality: what is missing to it cannot be mended by moving,
+but what is beyond it costs no more than a shift along the flex. Relabellings are priced by that for the slow modes, by
+the quadratic model for all others, and taken when the true merit falls.
+"""
+
+import time
+from dataclasses import dataclass
+from itertools import combinations, product
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from scipy.linalg import cho_factor, cho_solve, eigh
+
+from drkid.congruence.framework import Framework
+from drkid.congruence.levenberg_marquardt import Freedom
+from drkid.congruence.palette import Palette
+from drkid.congruence.rigidity import edge_vectors
+from drkid.congruence.sparse_solve import (
+    SparseLinearisation,
+    sparse_exact,
+    sparse_linearised,
+    sparse_smoothness,
+    sparse_solve,
+)
+from drkid.congruence.target import Target
+from drkid.mesh import Bools, Floats, Ints, TriMesh, read_only
+
+LEVELS = (0.02, 0.014, 0.01, 0.007, 0.005, 0.0035, 0.0025)  # weights of the shape at which exactness is approached
+SLOW = 0.06  # singular values below it belong to slow modes
+FAST_WEIGHT = 0.15  # of the shape, at which the quadratic model prices what the fast modes do
+DAMPING = 0.02  # of the quadratic model: keeps the flexes of the slow modes, which it no longer sees, in place
+TRIAL_WEIGHTS = (0.1, 0.04)  # on the way from a relabelling to its true merit
+TRIAL_ITERATIONS, SETTLE_ITERATIONS = 3, 8
+TRIALS = 12  # relabellings tried in vain before the weight is lowered
+LEAST_GAIN = 1e-3  # of the merit, that a relabelling must bring
+EXACT = 1e-9  # largest edge error, of the mean length
+NOISE = 0.5  # of the prices from the second round of levels on, in their spread: else it would try the same again
+
+
+class SlowModes(NamedTuple):
+    """Of the s slow modes: self-stresses `stress` (E, s), σ, S, misfit c, and what offset a shift by one costs.
+
+    `stiffness` is κ = (N v)ᵀ K (N v); all (s,).
+    """
+
+    stress: Floats
+    value: Floats
+    curvature: Floats
+    misfit: Floats
+    stiffness: Floats
+
+
+class FastModel(NamedTuple):
+    """Price of a change D of wanted lengths by the fast modes: Dᵀ `response` D + 2 Dᵀ `residual`, in offsets²."""
+
+    response: Floats
+    residual: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Relabellings:
+    """Proposals: edges (n, 2), the second −1 where only one changes, and the shift of each one's label, modulo q."""
+
+    edges: Ints
+    turns: Ints
+
+
+@njit(cache=True)
+def mode_price(misfit: float, value: float, curvature: float, stiffness: float, weight: float) -> float:
+    """What a slow mode costs, in offsets²: its shift if it can be solved, else what is missing, over weight²."""
+    still = (misfit / weight) ** 2
+    room = value * value + 4 * curvature * misfit
+    if room >= 0:
+        shift = 2 * misfit / max(value + np.sqrt(room), 1e-300)
+        return min(still, stiffness * shift * shift)
+    shift = -value / (2 * curvature)
+    missing = (misfit - value * shift / 2) / weight
+    return min(still, missing * missing + stiffness * shift * shift)
+
+
+@njit(cache=True)
+def modes_price(modes: SlowModes, added: Floats, weight: float) -> float:
+    """Sum over the slow modes, their misfits changed by `added` (s,)."""
+    total = 0.0
+    for i in range(len(added)):
+        misfit = modes.misfit[i] + added[i]
+        total += mode_price(misfit, modes.value[i], modes.curvature[i], modes.stiffness[i], weight)
+    return total
+
+
+@njit(cache=True)
+def _fits(faces: Ints, edge_faces: Ints, labels: Ints, allowed: Bools, pair: Ints) -> bool:
+    """Are the faces of these edges allowed?"""
+    for edge in pair:
+        if edge < 0:
+            continue
+        for face in edge_faces[edge]:
+            a, b, c = faces[face]
+            if not allowed[labels[a], labels[b], labels[c]]:
+                return False
+    return True
+
+
+@njit(cache=True)
+def _turn(labels: Ints, pair: Ints, turns: Ints, sign: int, size: int) -> None:
+    """Shift the labels of these edges, modulo the palette's size."""
+    for i in range(len(pair)):
+        if pair[i] >= 0:
+            labels[pair[i]] = (labels[pair[i]] + sign * turns[i]) % size
+
+
+@njit(cache=True)
+def _price(fast: FastModel, modes: SlowModes, pair: Ints, change: Floats, weight: float) -> float:
+    """Price of these edges' changes of wanted length (2,)."""
+    added, total = np.zeros(len(modes.value)), 0.0
+    for i in range(len(pair)):
+        if pair[i] < 0:
+            continue
+        total += 2 * change[i] * fast.residual[pair[i]]
+        for j in range(len(pair)):
+            if pair[j] >= 0:
+                total += change[i] * change[j] * fast.response[pair[i], pair[j]]
+        for s in range(len(added)):
+            added[s] += change[i] * modes.stress[pair[i], s]
+    return total + modes_price(modes, added, weight)
+
+
+@njit(cache=True, nogil=True)
+def _prices(  # noqa: PLR0913, PLR0917 — a kernel over plain arrays
+    fast: FastModel,
+    modes: SlowModes,
+    faces: Ints,
+    edge_faces: Ints,
+    labels: Ints,
+    lengths: Floats,
+    allowed: Bools,
+    edges: Ints,
+    turns: Ints,
+    weight: float,
+) -> Floats:
+    """(n,): change of the modelled merit by each proposal, infinite where a face would not be allowed."""
+    prices, change = np.full(len(edges), np.inf), np.zeros(2)
+    before = modes_price(modes, np.zeros(len(modes.value)), weight)
+    for n in range(len(edges)):
+        pair = edges[n]
+        for i in range(2):
+            change[i] = -lengths[labels[pair[i]]]
+        _turn(labels, pair, turns[n], 1, len(lengths))
+        for i in range(2):
+            change[i] += lengths[labels[pair[i]]]
+        if _fits(faces, edge_faces, labels, allowed, pair):
+            prices[n] = _price(fast, modes, pair, change, weight) - before
+        _turn(labels, pair, turns[n], -1, len(lengths))
+    return prices
+
+
+def relabellings(mesh: TriMesh, size: int) -> Relabellings:
+    """Every change of one edge, of two in a face, and of two across an edge."""
+    sides, (first, second) = mesh.face_edges, mesh.edge_faces.T
+    pairs = [sides[:, [a, b]] for a, b in combinations(range(3), 2)]
+    for a, b in product(range(3), repeat=2):
+        across = np.stack([sides[first, a], sides[second, b]], axis=1)
+        own = np.arange(len(mesh.edges))[:, None]
+        pairs.append(across[(across != own).all(axis=1)])
+    pair = np.unique(np.sort(np.concatenate(pairs), axis=1), axis=0)
+    alone = np.stack([np.arange(len(mesh.edges)), np.full(len(mesh.edges), -1)], axis=1)
+    turns = range(1, size)
+    edges = [alone for _ in turns] + [pair for _ in product(turns, repeat=2)]
+    shifts = [(t, 0) for t in turns] + list(product(turns, repeat=2))
+    rows = [np.tile(np.array(shift, np.int64), (len(e), 1)) for e, shift in zip(edges, shifts, strict=True)]
+    return Relabellings(read_only(np.concatenate(edges)), read_only(np.concatenate(rows)))
+
+
+def slow_modes(frame: Framework, target: Target, at: SparseLinearisation) -> SlowModes:
+    """The modes of J with singular values below `SLOW`, from the eigenvectors of J Jᵀ."""
+    gram = (at.jacobian @ at.jacobian.T).toarray()
+    squares, stress = eigh(gram, subset_by_value=(-1.0, SLOW**2), check_finite=False)
+    value = np.sqrt(np.maximum(squares, 1e-18))
+    flex = (at.jacobian.T @ stress) / value
+    direction, length = edge_vectors(frame.mesh.vertices, frame.mesh.edges)
+    points = flex.reshape(-1, 3, len(value))
+    apart = points[frame.mesh.edges[:, 1]] - points[frame.mesh.edges[:, 0]]
+    along = np.einsum("er,ers->es", direction, apart)
+    bending = (np.einsum("ers,ers->es", apart, apart) - along**2) / (2 * length[:, None])
+    _, normals = target.offsets(frame.mesh.vertices)
+    offset = np.einsum("vr,vrs->vs", normals, points)
+    return SlowModes(
+        np.ascontiguousarray(stress),
+        value,
+        np.einsum("es,es->s", stress, bending),
+        -(stress.T @ frame.residual),
+        np.einsum("vs,vs->s", offset, sparse_smoothness(frame.mesh) @ offset),
+    )
+
+
+def fast_model(frame: Framework, at: SparseLinearisation, modes: SlowModes, weight: float) -> FastModel:
+    """The quadratic model at a framework linearised at this weight, with the slow modes projected out of J.
+
+    Raises:
+        numpy.linalg.LinAlgError: the mesh is degenerate.
+    """
+    stress = modes.stress
+    pulled = at.jacobian.T @ stress
+    hessian = at.hessian.toarray() - pulled @ pulled.T
+    hessian[np.diag_indices_from(hessian)] += DAMPING**2
+    factor = cho_factor(hessian, lower=True, overwrite_a=True, check_finite=False)
+    jacobian = at.jacobian.toarray() - stress @ pulled.T
+    gradient = at.gradient - pulled @ (stress.T @ frame.residual)
+    both = cho_solve(factor, np.column_stack([jacobian.T, gradient]), check_finite=False)
+    misfit = -frame.residual + stress @ (stress.T @ frame.residual)
+    response = np.eye(len(frame.labels)) - stress @ stress.T - jacobian @ both[:, :-1]
+    return FastModel(np.ascontiguousarray(response) / weight**2, (misfit + jacobian @ both[:, -1]) / weight**2)
+
+
+@dataclass(frozen=True, eq=False)
+class Repair:
+    """What stays the same while folds of one connectivity are repaired; `deadline` is a `time.monotonic()`."""
+
+    target: Target
+    palette: Palette
+    freedom: Freedom
+    moves: Relabellings
+    deadline: float
+
+    @property
+    def over(self) -> bool:
+        """Has the time run out?"""
+        return time.monotonic() >= self.deadline
+
+    def priced(self, frame: Framework, weight: float) -> Floats:
+        """(n,): the modelled change of merit / weight² by each relabelling."""
+        stiffness = sparse_smoothness(frame.mesh)
+        at = sparse_linearised(frame, self.target, FAST_WEIGHT, stiffness)
+        modes = slow_modes(frame, self.target, at)
+        fast = fast_model(frame, at, modes, FAST_WEIGHT)
+        net = (frame.mesh.face_edges, frame.mesh.edge_faces, frame.labels.copy(), frame.lengths)
+        return _prices(
+            fast, modes, *net, self.palette.allowed, np.array(self.moves.edges), np.array(self.moves.turns), weight
+        )
+
+    def relabelled(self, frame: Framework, move: int) -> Framework:
+        """The framework with one relabelling done; vertices stay."""
+        labels = frame.labels.copy()
+        _turn(labels, self.moves.edges[move], self.moves.turns[move], 1, self.palette.size)
+        return Framework(frame.mesh, labels, frame.lengths).moved(frame.mesh.vertices, frame.lengths)
+
+    def settled(self, frame: Framework, weight: float) -> tuple[Framework, float]:
+        """The soft optimum at a weight, and its merit."""
+        return sparse_solve(frame, self.target, weight, self.freedom, SETTLE_ITERATIONS)
+
+    def tried(self, frame: Framework, move: int, weight: float) -> tuple[Framework, float]:
+        """The soft optimum after a relabelling; infinite merit where it breaks the mesh."""
+        try:
+            other = self.relabelled(frame, move)
+            for step in TRIAL_WEIGHTS:
+                other, _ = sparse_solve(other, self.target, step, self.freedom, TRIAL_ITERATIONS)
+            return self.settled(other, weight)
+        except np.linalg.LinAlgError:  # a refused move, like any that raises the merit
+            return frame, np.inf
+
+    def improved(self, frame: Framework, merit: float, weight: float, heat: float, rng: np.random.Generator):
+        """The first of the cheapest relabellings that lowers the true merit, or None."""
+        prices = self.priced(frame, weight)
+        spread = float(np.abs(np.partition(prices, TRIALS)[:TRIALS]).mean())
+        noisy = prices + heat * spread * rng.standard_normal(len(prices))
+        for move in np.argsort(noisy)[:TRIALS].tolist():
+            if self.over or not np.isfinite(prices[move]):
+                return None
+            other, value = self.tried(frame, move, weight)
+            if value < (1 - LEAST_GAIN) * merit:
+                return other, value
+        return None
+
+
+def repair(
+    frame: Framework,
+    target: Target,
+    palette: Palette,
+    rng: np.random.Generator,
+    deadline: float,
+    freedom: Freedom = "all",
+) -> Framework:
+    """Relabel until the mesh is exact or the time is over: the most exact framework met.
+
+    `deadline` is a `time.monotonic()`; the same labels are never left worse than they came.
+
+    Raises:
+        numpy.linalg.LinAlgError: the mesh is degenerate from the start.
+    """
+    task = Repair(target, palette, freedom, relabellings(frame.mesh, palette.size), deadline)
+    best, heat = frame, 0.0
+    while not task.over:
+        for weight in LEVELS:
+            frame = _descended(task, frame, weight, heat, rng)
+            solved = sparse_exact(frame, freedom)
+            best = min(best, solved, key=lambda one: one.worst)
+            if best.worst < EXACT or task.over:
+                return best
+        heat = NOISE
+    return best
+
+
+def _descended(task: Repair, frame: Framework, weight: float, heat: float, rng: np.random.Generator) -> Framework:
+    """Relabelled at one weight until nothing tried helps."""
+    frame, merit = task.settled(frame, weight)
+    while not task.over:
+        found = task.improved(frame, merit, weight, heat, rng)
+        if found is None:
+            break
+        frame, merit = found
+    return frame

@@ -1,0 +1,93 @@
+import numpy as np
+import pytest
+import trimesh
+
+from drkid.congruence import decompose
+from drkid.congruence.palette_solver import PaletteSolver
+from drkid.congruence.solver import run
+from drkid.intersection import self_intersections
+from drkid.mesh import TriMesh
+from drkid.spec import KitSpec
+
+TWO = KitSpec(method="palette", classes=2, rounds=4, tolerance_percent=0.001)
+
+
+@pytest.fixture(scope="module")
+def solved(pebble):
+    return decompose(pebble, TWO)
+
+
+def test_two_classes_are_exact_to_machine_precision(pebble, solved):
+    assert solved.outcome.status == "converged"
+    assert "exact" in solved.outcome.message
+    assert solved.face_errors.max() < 1e-9 * pebble.mean_edge
+    assert len(solved.class_lengths) == 2
+    assert len(solved.mesh.faces) == len(pebble.faces)
+
+
+def test_both_classes_are_isosceles_of_the_same_two_lengths(solved):
+    lengths = np.unique(solved.class_lengths.round(12))
+    assert len(lengths) == 2
+    for triple in solved.class_lengths:
+        assert len(np.unique(triple.round(12))) == 2
+
+
+def test_the_mesh_is_sound(pebble, solved):
+    assert solved.mesh.is_closed_manifold
+    assert solved.mesh.genus == 0
+    assert solved.mesh.volume == pytest.approx(pebble.volume, rel=0.2)
+    assert len(self_intersections(solved.mesh)) == 0
+
+
+def test_rounds_and_seed_decide_everything(pebble, solved):
+    again = decompose(pebble, TWO)
+    assert (again.mesh.vertices == solved.mesh.vertices).all()
+    assert (again.mesh.faces == solved.mesh.faces).all()
+
+
+def test_size_does_not_matter(pebble, solved):
+    large = decompose(pebble.scaled(1000), TWO)
+    assert large.mesh.vertices == pytest.approx(1000 * solved.mesh.vertices, rel=1e-4, abs=1)
+    assert large.face_errors.max() < 1e-6 * pebble.mean_edge
+
+
+def test_the_best_never_gets_worse_from_round_to_round(pebble):
+    solver = PaletteSolver(TWO, pebble)
+    state = solver.init(pebble)
+    for _ in range(3):
+        before = state.found.rank
+        state = solver.step(state)
+        assert state.found.rank <= before
+    assert state.round == 3
+    assert "d_H" in solver.told(state)
+
+
+def test_an_interruption_keeps_the_best_so_far(pebble, monkeypatch):
+    step = PaletteSolver.step
+
+    def impatient(self, state):
+        if state.round == 1:
+            raise KeyboardInterrupt
+        return step(self, state)
+
+    monkeypatch.setattr(PaletteSolver, "step", impatient)
+    solution = run(PaletteSolver(TWO, pebble), pebble, lambda *_: None)
+    assert "ended by hand" in solution.outcome.message
+    assert solution.iterations == 1
+    assert solution.best.mesh.is_closed_manifold
+
+
+def test_time_ends_the_search(pebble):
+    solver = PaletteSolver(KitSpec(method="palette", classes=2, seconds=0.01), pebble)
+    assert solver.finished(solver.init(pebble)) is not None
+
+
+def test_a_surface_with_a_handle_is_solved_as_far_as_it_goes():
+    """Genus 1 asks for six lengths more than there are freedoms: the scale is held and the residual made small."""
+    torus = trimesh.creation.torus(2.0, 0.9, major_sections=13, minor_sections=7)
+    ring = TriMesh(np.asarray(torus.vertices), np.asarray(torus.faces))
+    found = decompose(ring, KitSpec(method="palette", classes=4, rounds=2, tolerance_percent=5))
+    assert found.mesh.genus == 1
+    assert isinstance(found.mesh, TriMesh)
+    assert found.mesh.mean_edge == pytest.approx(ring.mean_edge, rel=0.1)
+    assert 100 * found.face_errors.max() / found.mesh.mean_edge < 10
