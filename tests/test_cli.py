@@ -132,7 +132,7 @@ def refused(arguments: list[str], capsys) -> str:
         (["--spacing", "1,2"], ["spacing"]),
         (["--process", "wood"], ["wood", "fdm"]),
         (["--facs", "40"], ["--facs", "--faces"]),
-        (["--method", "palette"], ["palette", "--method pressure"]),
+        (["--method", "palette", "--classes", "11"], ["11", "--method pressure"]),
         (["--spec", "nowhere.toml"], ["nowhere.toml", "cannot be read"]),
         (["--label", "3"], ["label"]),
     ],

@@ -49,5 +49,8 @@ def run(arguments: list[str]) -> int:
 
         tell_interrupted()
         return INTERRUPTED
+    except BrokenPipeError:  # the reader of our output has had enough, as `head` has
+        sys.stdout = None
+        return 0
     except SystemExit as status:  # the arguments could not be used, and cyclopts has said why
         return USAGE if status.code else 0

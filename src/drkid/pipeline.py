@@ -122,7 +122,7 @@ def _resolved(spec: KitSpec, surface: Surface, printed: Decomposition, part_set:
             "spacing": source.voxel_size,
             "unit": source.voxel_unit,
             "faces": None if spec.vertices is not None else spec.faces or DEFAULT_FACES,
-            "size_mm": float(printed.mesh.extents.max()),
+            "size_mm": round(float(printed.mesh.extents.max()), 9),
             "thickness_mm": dimensions.thickness_mm,
             "clearance_mm": dimensions.clearance_mm,
             "rod_clearance_mm": dimensions.rod_clearance_mm,

@@ -19,6 +19,14 @@ def test_edge_vectors_are_unit_vectors_towards_the_second_vertex(potato):
     np.testing.assert_allclose(ends[:, 0] + direction * length[:, None], ends[:, 1], atol=1e-14)
 
 
+@pytest.mark.parametrize("place", [0.0, np.nan])
+def test_edges_without_a_direction_are_refused(place):
+    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [place, 0, 0]])
+    for function in (edge_vectors, rigidity_matrix, infinitesimal_motions):
+        with pytest.raises(np.linalg.LinAlgError, match="no length"):
+            function(vertices, np.array([(0, 1), (0, 2)]))
+
+
 def test_rigidity_matrix_is_written_edge_by_edge():
     mesh = pebble()
     expected, _ = rows(mesh.vertices, mesh.edges)

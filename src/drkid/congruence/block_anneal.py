@@ -1,6 +1,6 @@
 """Annealing block by block: patches that cover the mesh, each with frozen surroundings, between sparse true solves.
 
-The time grows with the number of patches, so about linearly with the faces, where one dense model would need their cube.
+The time grows with the number of patches, so about linearly with the faces; one dense model would need their cube.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -12,7 +12,13 @@ from drkid.congruence.framework import Framework
 from drkid.congruence.levenberg_marquardt import Freedom
 from drkid.congruence.palette import Palette
 from drkid.congruence.patch import LocalModel, Patch, annealed_patch, local_model, packing, put_back
-from drkid.congruence.sparse_solve import sparse_exact, sparse_linearised, sparse_smoothness, sparse_solve
+from drkid.congruence.sparse_solve import (
+    SparseLinearisation,
+    sparse_exact,
+    sparse_linearised,
+    sparse_smoothness,
+    sparse_solve,
+)
 from drkid.congruence.target import Target
 
 START_WEIGHTS = (1.0, 0.6, 0.4, 0.25)
@@ -59,7 +65,9 @@ def anneal_by_patches(  # noqa: PLR0913 — what is solved, how softly, and with
             at = sparse_linearised(frame, target, weight, sparse_smoothness(frame.mesh))
             patches = packing(frame.mesh, blocks.core, blocks.moving, visits, rng)
 
-            def work(patch: Patch, own: np.random.Generator, frame: Framework = frame, at=at) -> LocalModel:
+            def work(
+                patch: Patch, own: np.random.Generator, frame: Framework = frame, at: SparseLinearisation = at
+            ) -> LocalModel:
                 local = local_model(frame, at, patch, blocks.damping)
                 return annealed_patch(
                     local, frame.lengths, palette.allowed.copy(), blocks.heat, blocks.steps_per_edge, own

@@ -21,7 +21,7 @@ from numba import njit
 from scipy.linalg import cho_factor, cho_solve, eigh
 
 from drkid.congruence.framework import Framework
-from drkid.congruence.levenberg_marquardt import Freedom
+from drkid.congruence.levenberg_marquardt import Freedom, solve
 from drkid.congruence.palette import Palette
 from drkid.congruence.rigidity import edge_vectors
 from drkid.congruence.sparse_solve import (
@@ -38,12 +38,15 @@ LEVELS = (0.02, 0.014, 0.01, 0.007, 0.005, 0.0035, 0.0025)  # weights of the sha
 SLOW = 0.06  # singular values below it belong to slow modes
 FAST_WEIGHT = 0.15  # of the shape, at which the quadratic model prices what the fast modes do
 DAMPING = 0.02  # of the quadratic model: keeps the flexes of the slow modes, which it no longer sees, in place
-TRIAL_WEIGHTS = (0.1, 0.04)  # on the way from a relabelling to its true merit
-TRIAL_ITERATIONS, SETTLE_ITERATIONS = 3, 8
-TRIALS = 12  # relabellings tried in vain before the weight is lowered
-LEAST_GAIN = 1e-3  # of the merit, that a relabelling must bring
+TRIAL_WEIGHTS, TRIAL_ITERATIONS = (0.1, 0.04), 2  # on the way from a relabelling to its true merit
+FIRST_LOOK, SETTLE_ITERATIONS = 3, 8
+HOPELESS = 1.3  # a merit above so many times the present one after a first look is not followed further
+MOST_DENSE = 150  # vertices up to which dense matrices are quicker
+TRIALS = 10  # relabellings tried in vain before the weight is lowered
+LEAST_GAIN = 3e-3  # of the merit, that a relabelling must bring
 EXACT = 1e-9  # largest edge error, of the mean length
 NOISE = 0.5  # of the prices from the second round of levels on, in their spread: else it would try the same again
+KICKS = 2  # relabellings at the beginning of those rounds that need not bring a gain
 
 
 class SlowModes(NamedTuple):
@@ -255,27 +258,35 @@ class Repair:
 
     def settled(self, frame: Framework, weight: float) -> tuple[Framework, float]:
         """The soft optimum at a weight, and its merit."""
-        return sparse_solve(frame, self.target, weight, self.freedom, SETTLE_ITERATIONS)
+        return self.solved(frame, weight, SETTLE_ITERATIONS)
 
-    def tried(self, frame: Framework, move: int, weight: float) -> tuple[Framework, float]:
+    def solved(self, frame: Framework, weight: float, iterations: int) -> tuple[Framework, float]:
+        """At most so many iterations of Levenberg–Marquardt."""
+        solver = solve if len(frame.mesh.vertices) <= MOST_DENSE else sparse_solve
+        return solver(frame, self.target, weight, self.freedom, iterations)
+
+    def tried(self, frame: Framework, merit: float, move: int, weight: float) -> tuple[Framework, float]:
         """The soft optimum after a relabelling; infinite merit where it breaks the mesh."""
         try:
             other = self.relabelled(frame, move)
             for step in TRIAL_WEIGHTS:
-                other, _ = sparse_solve(other, self.target, step, self.freedom, TRIAL_ITERATIONS)
-            return self.settled(other, weight)
+                other, _ = self.solved(other, step, TRIAL_ITERATIONS)
+            other, value = self.solved(other, weight, FIRST_LOOK)
+            return self.settled(other, weight) if value < HOPELESS * merit else (other, value)
         except np.linalg.LinAlgError:  # a refused move, like any that raises the merit
             return frame, np.inf
 
-    def improved(self, frame: Framework, merit: float, weight: float, heat: float, rng: np.random.Generator):
-        """The first of the cheapest relabellings that lowers the true merit, or None."""
+    def improved(
+        self, frame: Framework, merit: float, weight: float, heat: float, rng: np.random.Generator
+    ) -> tuple[Framework, float] | None:
+        """The first of the cheapest relabellings whose true merit falls below `LEAST_GAIN` under `merit`, or None."""
         prices = self.priced(frame, weight)
         spread = float(np.abs(np.partition(prices, TRIALS)[:TRIALS]).mean())
         noisy = prices + heat * spread * rng.standard_normal(len(prices))
         for move in np.argsort(noisy)[:TRIALS].tolist():
             if self.over or not np.isfinite(prices[move]):
                 return None
-            other, value = self.tried(frame, move, weight)
+            other, value = self.tried(frame, merit, move, weight)
             if value < (1 - LEAST_GAIN) * merit:
                 return other, value
         return None
@@ -297,23 +308,26 @@ def repair(
         numpy.linalg.LinAlgError: the mesh is degenerate from the start.
     """
     task = Repair(target, palette, freedom, relabellings(frame.mesh, palette.size), deadline)
-    best, heat = frame, 0.0
+    best, heat, kicks = frame, 0.0, 0
     while not task.over:
         for weight in LEVELS:
-            frame = _descended(task, frame, weight, heat, rng)
+            frame = _descended(task, frame, weight, heat, kicks if weight == LEVELS[0] else 0, rng)
             solved = sparse_exact(frame, freedom)
             best = min(best, solved, key=lambda one: one.worst)
             if best.worst < EXACT or task.over:
                 return best
-        heat = NOISE
+        heat, kicks = NOISE, KICKS
     return best
 
 
-def _descended(task: Repair, frame: Framework, weight: float, heat: float, rng: np.random.Generator) -> Framework:
-    """Relabelled at one weight until nothing tried helps."""
+def _descended(
+    task: Repair, frame: Framework, weight: float, heat: float, kicks: int, rng: np.random.Generator
+) -> Framework:
+    """Relabelled at one weight until nothing tried helps, after some kicks that may make it worse."""
     frame, merit = task.settled(frame, weight)
     while not task.over:
-        found = task.improved(frame, merit, weight, heat, rng)
+        found = task.improved(frame, HOPELESS * merit if kicks > 0 else merit, weight, heat, rng)
+        kicks -= 1
         if found is None:
             break
         frame, merit = found

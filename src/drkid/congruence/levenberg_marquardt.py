@@ -25,7 +25,7 @@ TRIALS = 5  # of larger damping, until the merit falls
 
 @dataclass(frozen=True, eq=False)
 class Linearisation:
-    """The merit at a framework, its gradient by the vertices (3V,), and what it was made of."""
+    """The merit at a framework, half its gradient by the vertices (3V,), and what it was made of."""
 
     merit: float
     gradient: Floats
@@ -80,7 +80,7 @@ def merit(frame: Framework, offset: Floats, weight: float) -> float:
 def linearised(
     frame: Framework, target: Target, weight: float, offsets: tuple[Floats, Floats] | None = None
 ) -> Linearisation:
-    """Merit, gradient and Gauss–Newton Hessian by the vertices; `offsets` where they are known already."""
+    """Merit, half its gradient and Gauss–Newton Hessian by the vertices; `offsets` where they are known already."""
     direction, _ = edge_vectors(frame.mesh.vertices, frame.mesh.edges)
     offset, normals = target.offsets(frame.mesh.vertices) if offsets is None else offsets
     pull = (weight**2 * normals * (frame.stiffness @ offset)[:, None]).ravel()

@@ -18,6 +18,10 @@ LETTERS = {1: "s", 2: "sl", 3: "abc"}
 
 # The choices that a research trial found best; ratio to the shortest length.
 RATIOS = {2: (1.0, 1.17), 3: (1.0, 1.1, 1.2)}
+ONE_CLASS_RATIOS = (1.0, 1.14)
+
+MOST_CLASSES = 10
+FIXED_CLASSES = (1, 2, 3, 4, MOST_CLASSES)  # the others need a mesh to choose for
 
 
 @dataclass(frozen=True)
@@ -74,7 +78,13 @@ def parse_multisets(text: str) -> Palette:
             remedy="--multisets ssl,sll",
         )
     multisets = sorted({tuple(sorted(letters.index(c) for c in word)) for word in words})
-    return Palette(RATIOS[len(letters)], tuple((a, b, c) for a, b, c in multisets))
+    ratios = ONE_CLASS_RATIOS if letters == "sl" and len(multisets) == 1 else RATIOS[len(letters)]
+    return Palette(ratios, tuple((a, b, c) for a, b, c in multisets))
+
+
+def moulds(palette: Palette) -> int:
+    """Number of moulds that make every piece: two for a scalene triangle, its mirror image being another, else one."""
+    return sum(2 if len(set(multiset)) == 3 else 1 for multiset in palette.multisets)
 
 
 def palette_of_classes(classes: int) -> Palette:
@@ -86,7 +96,7 @@ def palette_of_classes(classes: int) -> Palette:
     words = {1: "ssl", 2: "ssl,sll", 3: "sss,ssl,sll", 4: "sss,ssl,sll,lll"}
     if classes in words:
         return parse_multisets(words[classes])
-    if classes == len(all_multisets(3)):
+    if classes == MOST_CLASSES:
         return Palette(RATIOS[3], all_multisets(3))
     raise SpecError(
         f"the palette solver has no palette of {classes} classes",

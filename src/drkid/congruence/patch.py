@@ -18,6 +18,8 @@ from drkid.congruence.rigidity import edge_vectors
 from drkid.congruence.sparse_solve import SparseLinearisation
 from drkid.mesh import Bools, Floats, Ints, TriMesh
 
+FLIP_SHARE = 0.3
+
 
 @dataclass(frozen=True, eq=False)
 class Patch:
@@ -97,7 +99,7 @@ def local_model(frame: Framework, at: SparseLinearisation, patch: Patch, damping
         _connectivity(mesh, number, faces, edges, count),
         _model(frame, at, patch, edges, damping),
         frame.labels[edges],
-        (number[mesh.edges[edges]] < patch.core).all(axis=1),
+        np.asarray((number[mesh.edges[edges]] < patch.core).all(axis=1), np.bool_),
         patch.moving,
         faces,
         edges,
@@ -150,9 +152,6 @@ def annealed_patch(
     schedule = Schedule(temperature, steps_per_edge * len(active), FLIP_SHARE, active, local.free)
     anneal(local.net, local.model, local.labels, lengths, allowed, rng, schedule)
     return local
-
-
-FLIP_SHARE = 0.3
 
 
 def put_back(frame: Framework, patches: list[LocalModel]) -> Framework:

@@ -95,7 +95,7 @@ def _errors(points: Floats, labels: Ints, means: Floats) -> tuple[float, float, 
 
 @njit(cache=True)
 def _pressure(vertices: Floats, edges: Ints, lengths: Floats, wanted: Floats, shift: Floats, valence: Floats) -> None:
-    """Mean over each vertex's edges of half the wanted change along the edge (equation 7), into `shift` (V, 3)."""
+    """Mean over each vertex's edges of half the wanted change along the edge (equation 6), into `shift` (V, 3)."""
     shift[:] = 0
     for e in range(edges.shape[0]):
         i, j = edges[e, 0], edges[e, 1]

@@ -11,9 +11,16 @@ from drkid.mesh import Floats, Ints, read_only
 
 
 def edge_vectors(vertices: Floats, edges: Ints) -> tuple[Floats, Floats]:
-    """(E, 3) unit vectors from each edge's first to its second vertex, and the lengths (E,)."""
+    """(E, 3) unit vectors from each edge's first to its second vertex, and the lengths (E,).
+
+    Raises:
+        numpy.linalg.LinAlgError: an edge has no length, and so no direction.
+    """
     along = vertices[edges[:, 1]] - vertices[edges[:, 0]]
     length = np.linalg.norm(along, axis=1)
+    if not (length > 0).all():
+        message = "an edge has no length: the ends coincide or are not finite"
+        raise np.linalg.LinAlgError(message)
     return along / length[:, None], length
 
 

@@ -87,12 +87,13 @@ def sparse_linearised(frame: Framework, target: Target, weight: float, stiffness
     """Merit, gradient, Gauss–Newton Hessian and J at a framework whose K is `stiffness`."""
     count = len(frame.mesh.vertices)
     offset, normals = target.offsets(frame.mesh.vertices)
-    along = csr_array((normals.ravel(), np.arange(3 * count), np.arange(0, 3 * count + 1, 3)), (count, 3 * count))
+    rows = np.arange(0, 3 * count + 1, 3)
+    along = csr_array((weight * normals.ravel(), np.arange(3 * count), rows), shape=(count, 3 * count))
     jacobian = sparse_jacobian(frame)
     return SparseLinearisation(
         sparse_merit(frame, offset, stiffness, weight),
-        jacobian.T @ frame.residual + weight**2 * (along.T @ (stiffness @ offset)),
-        csc_array(jacobian.T @ jacobian + weight**2 * (along.T @ stiffness @ along)),
+        np.asarray(jacobian.T @ frame.residual + weight * (along.T @ (stiffness @ offset)), np.float64),
+        csc_array(jacobian.T @ jacobian + along.T @ stiffness @ along),
         jacobian,
     )
 
@@ -130,7 +131,7 @@ def _damped_step(frame: Framework, at: SparseLinearisation, freedom: Freedom, da
     both = factor.solve(np.column_stack([coupling, at.gradient]))
     schur = columns.T @ columns - coupling.T @ both[:, :-1]
     schur[np.diag_indices_from(schur)] += 1e-9
-    step = np.linalg.solve(schur, columns.T @ frame.residual + coupling.T @ both[:, -1])
+    step = np.asarray(np.linalg.solve(schur, columns.T @ frame.residual + coupling.T @ both[:, -1]), np.float64)
     shift = -both[:, -1] - both[:, :-1] @ step
     return frame.moved(frame.mesh.vertices + shift.reshape(-1, 3), changed_lengths(frame, freedom, step))
 

@@ -1,0 +1,144 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drkid.congruence.block_anneal import Blocks, anneal_by_patches, sparse_exactly, sparse_start
+from drkid.congruence.framework import Framework
+from drkid.congruence.labelling import nearest_labels, repaired
+from drkid.congruence.palette import Palette, palette_of_classes
+from drkid.congruence.patch import Patch, annealed_patch, ball, local_model, neighbours, packing, put_back
+from drkid.congruence.quadratic_model import price_of_labels
+from drkid.congruence.sparse_solve import sparse_linearised, sparse_smoothness, sparse_solve
+from drkid.congruence.target import Target
+
+WEIGHT, DAMPING = 0.4, 0.05
+QUICK = Blocks(steps_per_edge=100, core=25, moving=50, visits=1)
+
+
+@pytest.fixture(scope="module")
+def palette() -> Palette:
+    return palette_of_classes(4)
+
+
+@pytest.fixture(scope="module")
+def target(potato) -> Target:
+    return Target(potato.scaled(1 / potato.mean_edge))
+
+
+@pytest.fixture(scope="module")
+def frame(target, palette) -> Framework:
+    """The potato in units of its mean edge, labelled and softly solved."""
+    mesh = target.mesh
+    lengths = np.array([0.93, 1.08])
+    labels = repaired(mesh, nearest_labels(mesh, lengths), palette, lengths, np.random.default_rng(0))
+    assert labels is not None
+    return sparse_solve(Framework(mesh, labels, lengths), target, WEIGHT, "scale", 4)[0]
+
+
+@pytest.fixture(scope="module")
+def linearised(frame, target):
+    return sparse_linearised(frame, target, WEIGHT, sparse_smoothness(frame.mesh))
+
+
+def disk(frame: Framework, count: int = 50, core: int = 25, centre: int = 3) -> Patch:
+    return Patch(np.array(ball(neighbours(frame.mesh), centre, count, set())), core)
+
+
+def whole_energy(frame, at, moving, lengths_wanted) -> float:
+    """Least value of the model when only these vertices move, by solving it."""
+    freedoms = (3 * moving[:, None] + np.arange(3)).ravel()
+    residual = frame.mesh.edge_lengths - lengths_wanted
+    jacobian = at.jacobian.toarray()[:, freedoms]
+    hessian = at.hessian.toarray()[np.ix_(freedoms, freedoms)] + DAMPING**2 * np.eye(len(freedoms))
+    pull = at.gradient - at.jacobian.T @ frame.residual  # of the offsets alone
+    gradient = jacobian.T @ residual + pull[freedoms]
+    return float(residual @ residual - gradient @ np.linalg.solve(hessian, gradient))
+
+
+@given(centre=st.integers(0, 161), count=st.integers(1, 162))
+def test_a_ball_is_connected_distinct_and_of_the_size_asked(frame, centre, count):
+    around = neighbours(frame.mesh)
+    inside = ball(around, centre, count, set())
+    assert len(set(inside)) == len(inside) == count
+    assert inside[0] == centre
+    assert all(set(around[v]) & set(inside[:i]) for i, v in enumerate(inside) if i)
+
+
+@given(seed=st.integers(0, 1000), core=st.integers(5, 30))
+@settings(max_examples=20)
+def test_patches_of_a_packing_are_disjoint_and_rounds_of_them_visit_every_vertex(frame, seed, core):
+    rng, visits = np.random.default_rng(seed), np.zeros(len(frame.mesh.vertices), np.int64)
+    for _ in range(200):
+        patches = packing(frame.mesh, core, 2 * core, visits, rng)
+        moving = np.concatenate([p.moving for p in patches])
+        assert len(np.unique(moving)) == len(moving)
+        for p in patches:
+            assert core <= len(p.moving) <= 2 * core
+            visits[p.moving[:core]] += 1
+        if visits.min() >= 1:
+            break
+    assert visits.min() >= 1
+
+
+def test_the_price_of_a_relabelling_is_what_solving_the_frozen_model_again_gives(frame, linearised):
+    patch = disk(frame)
+    local = local_model(frame, linearised, patch, DAMPING)
+    before = whole_energy(frame, linearised, patch.moving, frame.wanted)
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        chosen = rng.choice(np.flatnonzero(local.free), 2, replace=False)
+        new = 1 - local.labels[chosen]
+        wanted = frame.wanted.copy()
+        wanted[local.edges[chosen]] = frame.lengths[new]
+        price = price_of_labels(local.model, frame.lengths, local.labels, chosen, new, 2)
+        after = whole_energy(frame, linearised, patch.moving, wanted)
+        assert price == pytest.approx(after - before, rel=1e-6, abs=1e-10)
+
+
+def test_annealing_changes_only_the_core_and_leaves_a_sound_allowed_mesh(frame, linearised, palette):
+    patch = disk(frame)
+    local = local_model(frame, linearised, patch, DAMPING)
+    annealed_patch(local, frame.lengths, palette.allowed.copy(), 1.0, 100, np.random.default_rng(0))
+    found = put_back(frame, [local])
+    assert found.mesh.is_closed_manifold
+    assert found.mesh.genus == 0
+    assert palette.allowed[tuple(found.labels[found.mesh.face_edges].T)].all()
+
+    def labelled(one: Framework) -> set[tuple[int, int, int]]:
+        return {(int(a), int(b), int(n)) for (a, b), n in zip(one.mesh.edges, one.labels, strict=True)}
+
+    changed = labelled(found) ^ labelled(frame)
+    core = set(patch.moving[: patch.core].tolist())
+    assert changed
+    assert all(a in core and b in core for a, b, _ in changed)
+    assert len(set(map(tuple, found.mesh.edges.tolist())) - set(map(tuple, frame.mesh.edges.tolist()))) > 0
+
+
+def test_annealing_by_patches_lowers_the_merit_whatever_the_number_of_workers(frame, target, palette):
+    merits, found = [], []
+    for workers in (1, 2):
+        one = anneal_by_patches(
+            frame,
+            target,
+            palette,
+            weight=WEIGHT,
+            freedom="scale",
+            rng=np.random.default_rng(5),
+            blocks=QUICK,
+            workers=workers,
+        )
+        merits.append(sparse_linearised(one, target, WEIGHT, sparse_smoothness(one.mesh)).merit)
+        found.append(one)
+    np.testing.assert_array_equal(found[0].labels, found[1].labels)
+    np.testing.assert_allclose(found[0].mesh.vertices, found[1].mesh.vertices, atol=1e-9)
+    assert merits[0] < 0.7 * sparse_linearised(frame, target, WEIGHT, sparse_smoothness(frame.mesh)).merit
+
+
+def test_a_start_and_the_exact_phase_leave_small_errors_and_the_ratio_held_meanwhile(frame, target, palette):
+    soft = sparse_start(frame, target, palette, "all", np.random.default_rng(2), QUICK)
+    assert soft.lengths[1] / soft.lengths[0] == pytest.approx(frame.lengths[1] / frame.lengths[0])
+    solved = sparse_exactly(soft, target, "all")
+    assert solved.worst < 0.03
+    assert solved.worst <= sparse_exactly(soft, target, "all", square=False).worst
+    assert palette.allowed[tuple(solved.labels[solved.mesh.face_edges].T)].all()
