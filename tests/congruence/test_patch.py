@@ -99,7 +99,7 @@ def test_the_price_of_a_relabelling_is_what_solving_the_frozen_model_again_gives
 def test_annealing_changes_only_the_core_and_leaves_a_sound_allowed_mesh(frame, linearised, palette):
     patch = disk(frame)
     local = local_model(frame, linearised, patch, DAMPING)
-    annealed_patch(local, frame.lengths, palette.allowed.copy(), 1.0, 100, np.random.default_rng(0))
+    annealed_patch(local, frame.lengths, palette.allowed.copy(), 30.0, 100, np.random.default_rng(0))
     found = put_back(frame, [local])
     assert found.mesh.is_closed_manifold
     assert found.mesh.genus == 0

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse import csc_array
 from scipy.spatial.transform import Rotation
@@ -18,14 +18,15 @@ from drkid.congruence.sparse_solve import (
     sparse_solve,
 )
 from drkid.congruence.target import Target, smoothness
-from drkid.mesh import TriMesh
 
 
 @pytest.fixture(scope="module")
 def frame(potato) -> Framework:
-    """The potato, its edges labelled by the nearer of two lengths."""
-    lengths = potato.mean_edge * np.array([0.9, 1.1])
-    return Framework(potato, np.abs(potato.edge_lengths[:, None] - lengths).argmin(axis=1), lengths)
+    """The potato, shaken so that nothing is symmetric, its edges labelled by the nearer of two lengths."""
+    noise = np.random.default_rng(0).normal(size=potato.vertices.shape)
+    mesh = potato.moved(potato.vertices + 0.1 * potato.mean_edge * noise)
+    lengths = mesh.mean_edge * np.array([0.9, 1.1])
+    return Framework(mesh, np.abs(mesh.edge_lengths[:, None] - lengths).argmin(axis=1), lengths)
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +63,8 @@ def test_the_palette_stays_where_it_is_held(frame, target):
     assert scaled.lengths[1] / scaled.lengths[0] == pytest.approx(frame.lengths[1] / frame.lengths[0], rel=1e-12)
 
 
-@given(st.sampled_from([0.5, 0.1, 0.02]), st.integers(0, 50))
+@settings(max_examples=15)
+@given(weight=st.sampled_from([0.5, 0.1, 0.02]), seed=st.integers(0, 50))
 def test_the_merit_never_rises_and_is_that_of_the_result(frame, target, weight, seed):
     labels = np.random.default_rng(seed).integers(0, 2, len(frame.labels))
     begun = Framework(frame.mesh, labels, frame.lengths)
@@ -74,28 +76,30 @@ def test_the_merit_never_rises_and_is_that_of_the_result(frame, target, weight, 
     assert value == pytest.approx(sparse_merit(found, offset, stiffness, weight), rel=1e-9)
 
 
-def test_newton_is_exact_near_a_mesh_with_a_palette_and_agrees_with_the_dense_one(frame):
-    """Any lengths near a rigid mesh's own can be had: here each of two, moved by a little, with many labels."""
-    count = 40
-    edge = frame.mesh.edge_lengths
-    order = np.argsort(edge)
-    labels = np.empty(len(edge), np.int64)
-    labels[order] = np.arange(len(edge)) * count // len(edge)
-    lengths = np.array([edge[labels == i].mean() for i in range(count)])
-    begun = Framework(frame.mesh, labels, lengths)
-    ours, theirs = sparse_exact(begun, "none"), newton.exact(begun, "scale")
-    assert begun.worst > 1e-3
-    assert ours.worst < 1e-10
-    ours = sparse_exact(begun, "scale")
-    assert ours.worst < 1e-10
-    np.testing.assert_allclose(ours.mesh.vertices, theirs.mesh.vertices, atol=1e-6)
+def test_newton_is_exact_near_a_rigid_mesh_and_agrees_with_the_dense_one(frame):
+    """Any lengths near a rigid mesh's own can be had: here each edge has one of its own."""
+    noise = np.random.default_rng(1).normal(size=len(frame.labels))
+    begun = Framework(frame.mesh, np.arange(len(noise)), frame.mesh.edge_lengths * (1 + 3e-5 * noise))
+    assert begun.worst > 3e-5
+    assert sparse_exact(begun, "none").worst < 1e-11
+    ours, theirs = sparse_exact(begun, "scale"), newton.exact(begun, "scale")
+    assert ours.worst < 1e-11
+    np.testing.assert_allclose(ours.mesh.vertices, theirs.mesh.vertices, atol=1e-9)
+    np.testing.assert_allclose(ours.lengths, theirs.lengths, atol=1e-10)
+
+
+def test_newton_does_as_the_dense_one_with_few_lengths(frame, target):
+    soft, _ = sparse_solve(frame, target, 0.05, "all", 4)
+    ours, theirs = sparse_exact(soft, "all"), newton.exact(soft, "all")
+    assert ours.worst <= soft.worst
+    assert ours.worst == pytest.approx(theirs.worst, rel=1e-2)
 
 
 def test_a_rigid_motion_changes_nothing(frame, potato):
-    rotation = Rotation.from_rotvec([0.3, -1.0, 0.5])
-    moved = TriMesh(potato.vertices @ rotation.as_matrix().T + np.array([1.0, 2.0, 3.0]), potato.faces)
+    rotation = Rotation.from_rotvec([0.3, -1.0, 0.5]).as_matrix()
+    surface, mesh = (one.moved(one.vertices @ rotation.T + np.array([1.0, 2.0, 3.0])) for one in (potato, frame.mesh))
     here, value = sparse_solve(frame, Target(potato), 0.2, "all", 2)
-    there, other = sparse_solve(Framework(moved, frame.labels, frame.lengths), Target(moved), 0.2, "all", 2)
+    there, other = sparse_solve(Framework(mesh, frame.labels, frame.lengths), Target(surface), 0.2, "all", 2)
     assert value == pytest.approx(other, rel=1e-6)
     np.testing.assert_allclose(here.lengths, there.lengths, rtol=1e-6)
 

@@ -12,7 +12,7 @@ the quadratic model for all others, and taken when the true merit falls.
 """
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, product
 from typing import NamedTuple
 
@@ -38,15 +38,15 @@ LEVELS = (0.02, 0.014, 0.01, 0.007, 0.005, 0.0035, 0.0025)  # weights of the sha
 SLOW = 0.06  # singular values below it belong to slow modes
 FAST_WEIGHT = 0.15  # of the shape, at which the quadratic model prices what the fast modes do
 DAMPING = 0.02  # of the quadratic model: keeps the flexes of the slow modes, which it no longer sees, in place
-TRIAL_WEIGHTS, TRIAL_ITERATIONS = (0.1, 0.04), 2  # on the way from a relabelling to its true merit
+TRIAL_WEIGHTS, TRIAL_ITERATIONS = (0.04,), 1  # on the way from a relabelling to its true merit
 FIRST_LOOK, SETTLE_ITERATIONS = 3, 8
-HOPELESS = 1.3  # a merit above so many times the present one after a first look is not followed further
+HOPELESS = 1.1  # a merit above so many times the present one after a first look is not followed further
 MOST_DENSE = 150  # vertices up to which dense matrices are quicker
 TRIALS = 10  # relabellings tried in vain before the weight is lowered
 LEAST_GAIN = 3e-3  # of the merit, that a relabelling must bring
 EXACT = 1e-9  # largest edge error, of the mean length
 NOISE = 0.5  # of the prices from the second round of levels on, in their spread: else it would try the same again
-KICKS = 2  # relabellings at the beginning of those rounds that need not bring a gain
+KICKS, KICK = 2, 1.3  # relabellings at the beginning of those rounds, and to what multiple of the merit they may lead
 
 
 class SlowModes(NamedTuple):
@@ -63,10 +63,14 @@ class SlowModes(NamedTuple):
 
 
 class FastModel(NamedTuple):
-    """Price of a change D of wanted lengths by the fast modes: Dᵀ `response` D + 2 Dᵀ `residual`, in offsets²."""
+    """Price of a change D of wanted lengths by the fast modes: Dᵀ `response` D + 2 Dᵀ `residual`, in offsets².
+
+    The vertices answer to it by `answer` D; `answer` (3V, E).
+    """
 
     response: Floats
     residual: Floats
+    answer: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +194,7 @@ def slow_modes(frame: Framework, target: Target, at: SparseLinearisation) -> Slo
     value = np.sqrt(np.maximum(squares, 1e-18))
     flex = (at.jacobian.T @ stress) / value
     direction, length = edge_vectors(frame.mesh.vertices, frame.mesh.edges)
-    points = flex.reshape(-1, 3, len(value))
+    points = flex.reshape(len(frame.mesh.vertices), 3, len(value))
     apart = points[frame.mesh.edges[:, 1]] - points[frame.mesh.edges[:, 0]]
     along = np.einsum("er,ers->es", direction, apart)
     bending = (np.einsum("ers,ers->es", apart, apart) - along**2) / (2 * length[:, None])
@@ -221,7 +225,8 @@ def fast_model(frame: Framework, at: SparseLinearisation, modes: SlowModes, weig
     both = cho_solve(factor, np.column_stack([jacobian.T, gradient]), check_finite=False)
     misfit = -frame.residual + stress @ (stress.T @ frame.residual)
     response = np.eye(len(frame.labels)) - stress @ stress.T - jacobian @ both[:, :-1]
-    return FastModel(np.ascontiguousarray(response) / weight**2, (misfit + jacobian @ both[:, -1]) / weight**2)
+    residual = misfit + jacobian @ both[:, -1]
+    return FastModel(np.ascontiguousarray(response) / weight**2, residual / weight**2, both[:, :-1].copy())
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,22 +244,26 @@ class Repair:
         """Has the time run out?"""
         return time.monotonic() >= self.deadline
 
-    def priced(self, frame: Framework, weight: float) -> Floats:
-        """(n,): the modelled change of merit / weight² by each relabelling."""
+    def priced(self, frame: Framework, weight: float) -> tuple[Floats, Floats]:
+        """(n,): the modelled change of merit / weight² by each relabelling; and the fast model's `answer`."""
         stiffness = sparse_smoothness(frame.mesh)
         at = sparse_linearised(frame, self.target, FAST_WEIGHT, stiffness)
         modes = slow_modes(frame, self.target, at)
         fast = fast_model(frame, at, modes, FAST_WEIGHT)
         net = (frame.mesh.face_edges, frame.mesh.edge_faces, frame.labels.copy(), frame.lengths)
-        return _prices(
+        prices = _prices(
             fast, modes, *net, self.palette.allowed, np.array(self.moves.edges), np.array(self.moves.turns), weight
         )
+        return prices, fast.answer
 
-    def relabelled(self, frame: Framework, move: int) -> Framework:
-        """The framework with one relabelling done; vertices stay."""
+    def relabelled(self, frame: Framework, move: int, answer: Floats) -> Framework:
+        """The framework with one relabelling done, its vertices where the fast modes take them."""
         labels = frame.labels.copy()
         _turn(labels, self.moves.edges[move], self.moves.turns[move], 1, self.palette.size)
-        return Framework(frame.mesh, labels, frame.lengths).moved(frame.mesh.vertices, frame.lengths)
+        edges = self.moves.edges[move][self.moves.edges[move] >= 0]
+        shift = answer[:, edges] @ (frame.lengths[labels[edges]] - frame.wanted[edges])
+        moved = frame.moved(frame.mesh.vertices + shift.reshape(-1, 3), frame.lengths)
+        return replace(moved, labels=labels)
 
     def settled(self, frame: Framework, weight: float) -> tuple[Framework, float]:
         """The soft optimum at a weight, and its merit."""
@@ -265,28 +274,27 @@ class Repair:
         solver = solve if len(frame.mesh.vertices) <= MOST_DENSE else sparse_solve
         return solver(frame, self.target, weight, self.freedom, iterations)
 
-    def tried(self, frame: Framework, merit: float, move: int, weight: float) -> tuple[Framework, float]:
-        """The soft optimum after a relabelling; infinite merit where it breaks the mesh."""
+    def tried(self, other: Framework, merit: float, weight: float) -> tuple[Framework, float]:
+        """The soft optimum of a relabelled framework; infinite merit where it breaks the mesh."""
         try:
-            other = self.relabelled(frame, move)
             for step in TRIAL_WEIGHTS:
                 other, _ = self.solved(other, step, TRIAL_ITERATIONS)
             other, value = self.solved(other, weight, FIRST_LOOK)
             return self.settled(other, weight) if value < HOPELESS * merit else (other, value)
         except np.linalg.LinAlgError:  # a refused move, like any that raises the merit
-            return frame, np.inf
+            return other, np.inf
 
     def improved(
         self, frame: Framework, merit: float, weight: float, heat: float, rng: np.random.Generator
     ) -> tuple[Framework, float] | None:
         """The first of the cheapest relabellings whose true merit falls below `LEAST_GAIN` under `merit`, or None."""
-        prices = self.priced(frame, weight)
+        prices, answer = self.priced(frame, weight)
         spread = float(np.abs(np.partition(prices, TRIALS)[:TRIALS]).mean())
         noisy = prices + heat * spread * rng.standard_normal(len(prices))
         for move in np.argsort(noisy)[:TRIALS].tolist():
             if self.over or not np.isfinite(prices[move]):
                 return None
-            other, value = self.tried(frame, merit, move, weight)
+            other, value = self.tried(self.relabelled(frame, move, answer), merit, weight)
             if value < (1 - LEAST_GAIN) * merit:
                 return other, value
         return None
@@ -302,14 +310,14 @@ def repair(
 ) -> Framework:
     """Relabel until the mesh is exact or the time is over: the most exact framework met.
 
-    `deadline` is a `time.monotonic()`; the same labels are never left worse than they came.
+    `deadline` is a `time.monotonic()`; what comes back is never less exact than Newton's method makes what came.
 
     Raises:
         numpy.linalg.LinAlgError: the mesh is degenerate from the start.
     """
     task = Repair(target, palette, freedom, relabellings(frame.mesh, palette.size), deadline)
-    best, heat, kicks = frame, 0.0, 0
-    while not task.over:
+    best, heat, kicks = min(frame, sparse_exact(frame, freedom), key=lambda one: one.worst), 0.0, 0
+    while not task.over and best.worst >= EXACT:
         for weight in LEVELS:
             frame = _descended(task, frame, weight, heat, kicks if weight == LEVELS[0] else 0, rng)
             solved = sparse_exact(frame, freedom)
@@ -326,7 +334,7 @@ def _descended(
     """Relabelled at one weight until nothing tried helps, after some kicks that may make it worse."""
     frame, merit = task.settled(frame, weight)
     while not task.over:
-        found = task.improved(frame, HOPELESS * merit if kicks > 0 else merit, weight, heat, rng)
+        found = task.improved(frame, KICK * merit if kicks > 0 else merit, weight, heat, rng)
         kicks -= 1
         if found is None:
             break

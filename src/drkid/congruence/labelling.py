@@ -14,13 +14,13 @@ from drkid.errors import SpecError
 from drkid.mesh import Floats, Ints, TriMesh
 
 SWEEPS = 200
-TRIALS = 10
+TRIALS = 4
 
 
 def first_labels(mesh: TriMesh, palette: Palette, lengths: Floats, rng: np.random.Generator) -> Ints:
     """(E,): labels near the edges' lengths with which every face is allowed.
 
-    Where the local search finds none, one isosceles class of the palette still has a matching.
+    Where the local search finds none, one class may do alone: isosceles by a matching, or equilateral.
 
     Args:
         mesh: closed.
@@ -38,9 +38,10 @@ def first_labels(mesh: TriMesh, palette: Palette, lengths: Floats, rng: np.rando
         labels = repaired(mesh, nearest, palette, lengths, rng)
         if labels is not None:
             return labels
-    isosceles = [matched_labels(mesh, m, lengths) for m in palette.multisets if _is_isosceles(m)]
-    if isosceles:
-        return min(isosceles, key=lambda labels: float(((mesh.edge_lengths - lengths[labels]) ** 2).sum()))
+    alone = [matched_labels(mesh, m, lengths) for m in palette.multisets if _is_isosceles(m)]
+    alone += [np.full(len(mesh.edges), m[0]) for m in palette.multisets if m[0] == m[2]]
+    if alone:
+        return min(alone, key=lambda labels: float(((mesh.edge_lengths - lengths[labels]) ** 2).sum()))
     raise SpecError(
         "no labelling of this mesh has only allowed triangles",
         wanted=f"triangles of {len(palette.multisets)} kinds",

@@ -16,10 +16,10 @@ from drkid.congruence.levenberg_marquardt import solve
 from drkid.congruence.palette import FIXED_CLASSES, MOST_CLASSES, Multiset, Palette, palette_of_classes
 from drkid.congruence.target import Target
 from drkid.errors import SpecError
-from drkid.mesh import TriMesh
+from drkid.mesh import Ints, TriMesh
 
 TRIAL_WEIGHT, TRIAL_DAMPING, TRIAL_HEAT, TRIAL_STEPS_PER_FACE = 0.4, 0.05, 1.0, 60
-TRIAL_ITERATIONS = 2
+TRIALS, TRIAL_ITERATIONS = 3, 2
 DROPPED, EXCHANGED = 4, 3  # so many of the least used multisets are tried to leave, and of the others to come in
 
 
@@ -81,25 +81,29 @@ class Trials:
     known: dict[tuple[Multiset, ...], tuple[float, tuple[int, ...]]] = field(default_factory=dict)
 
     def of(self, multisets: tuple[Multiset, ...]) -> tuple[float, tuple[int, ...]]:
-        """The merit after a short annealing (infinite where no labels were found), and faces of each multiset.
+        """Mean merit after short annealings (infinite where no labels were found), and faces of each multiset in all.
 
         The same random numbers serve every set, so that their misfits compare.
         """
         if multisets not in self.known:
-            self.known[multisets] = self._tried(replace(self.palette, multisets=multisets))
+            palette = replace(self.palette, multisets=multisets)
+            tried = [self._tried(palette, np.random.default_rng([self.seed, number])) for number in range(TRIALS)]
+            uses = np.bincount(np.concatenate([used for _, used in tried]), minlength=len(multisets))
+            self.known[multisets] = float(np.mean([merit for merit, _ in tried])), tuple(uses.tolist())
         return self.known[multisets]
 
-    def _tried(self, palette: Palette) -> tuple[float, tuple[int, ...]]:
-        rng = np.random.default_rng(self.seed)
+    def _tried(self, palette: Palette, rng: np.random.Generator) -> tuple[float, Ints]:
+        """Merit, and each face's multiset (F,); infinite, and no face, where no labels are found."""
         lengths = np.array(palette.ratios) / np.mean(palette.ratios)
-        labels = first_labels(self.mesh, palette, lengths, rng)
+        try:
+            labels = first_labels(self.mesh, palette, lengths, rng)
+        except SpecError:  # this set is no candidate; the search goes on with the others
+            return np.inf, np.zeros(0, np.int64)
         frame = Framework(self.mesh, labels, palette.lengths(1.0, labels))
         how = Anneal(TRIAL_WEIGHT, TRIAL_DAMPING, TRIAL_HEAT, TRIAL_STEPS_PER_FACE * len(self.mesh.faces))
-        problem = Problem(self.target, palette, "scale", square=False)
-        frame = annealed(frame, problem, how, rng)
+        frame = annealed(frame, Problem(self.target, palette, "scale", square=False), how, rng)
         frame, merit = solve(frame, self.target, TRIAL_WEIGHT, "scale", TRIAL_ITERATIONS)
-        uses = np.bincount(palette.class_of(frame.labels[frame.mesh.face_edges]), minlength=len(palette.multisets))
-        return merit, tuple(uses.tolist())
+        return merit, palette.class_of(frame.labels[frame.mesh.face_edges])
 
     def best(self, candidates: Iterable[tuple[Multiset, ...]]) -> tuple[Multiset, ...]:
         """The candidate of the least misfit."""
