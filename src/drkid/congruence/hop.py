@@ -22,6 +22,7 @@ START_WEIGHTS = (1.0, 0.6, 0.4, 0.25)
 START_DAMPING, START_HEAT, START_STEPS_PER_FACE = 0.05, 3.0, 1200
 EXACT_WEIGHTS, EXACT_ITERATIONS = (0.1, 0.03, 0.01), 6
 HOP_WEIGHT, HOP_DAMPING, HOP_HEAT, HOP_STEPS = (0.1, 0.3), (0.02, 0.1), (0.05, 0.8), 15_000
+HOP_WEIGHT_OF_ONE, HOP_HEAT_OF_ONE = (0.15, 0.6), (2.0, 20.0)  # one class alone: gentler hops end where they began
 HOP_EXACT_WEIGHT, HOP_ITERATIONS = 0.03, 5
 FLIP_SHARE = 0.3
 LOCAL_VERTICES = 30  # around the vertex of a local hop
@@ -105,7 +106,9 @@ def exactly(frame: Framework, problem: Problem, weights: tuple[float, ...] = EXA
 
 def hop(frame: Framework, problem: Problem, rng: np.random.Generator, active: Ints | None = None) -> Framework:
     """Soften, anneal gently, solve again. `worst` of the result tells whether it is exact."""
-    weight, damping, heat = (float(np.exp(rng.uniform(*np.log(r)))) for r in (HOP_WEIGHT, HOP_DAMPING, HOP_HEAT))
+    one = len(problem.palette.multisets) == 1
+    ranges = (HOP_WEIGHT_OF_ONE, HOP_DAMPING, HOP_HEAT_OF_ONE) if one else (HOP_WEIGHT, HOP_DAMPING, HOP_HEAT)
+    weight, damping, heat = (float(np.exp(rng.uniform(*np.log(r)))) for r in ranges)
     soft, _ = solve(frame, problem.target, weight, problem.freedom, 4)
     soft = annealed(soft, problem, Anneal(weight, damping, heat, HOP_STEPS), rng, active)
     soft, _ = solve(soft, problem.target, weight, problem.freedom, 4)

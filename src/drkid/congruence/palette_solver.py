@@ -18,8 +18,9 @@ from threadpoolctl import threadpool_limits
 
 from drkid.congruence.framework import Framework
 from drkid.congruence.hop import Problem, edges_around, exactly, hop, start
-from drkid.congruence.labelling import nearest_labels, repaired
-from drkid.congruence.palette import Palette, palette_of_classes
+from drkid.congruence.labelling import first_labels
+from drkid.congruence.palette import Palette
+from drkid.congruence.palette_subset import palette_for
 from drkid.congruence.score import Quality, Yardstick
 from drkid.congruence.solver import Candidate
 from drkid.congruence.target import Target
@@ -33,7 +34,8 @@ from drkid.spec import KitSpec
 EXACT = 1e-9  # largest edge error, of the mean edge, that counts as exact
 START_RATIOS = (1.17, 1.15, 1.19)  # of two lengths, tried in turn
 STARTS, TASKS_PER_ROUND = 6, 4
-LABEL_TRIALS = 20
+MOST_FACES = 800  # the dense model takes memory as the square of the faces, and time as the cube
+LEAST_RATIO = 1.03  # between neighbouring lengths of the palette: nearer ones are one length to a hand
 UNIT_ERROR = 100.0  # a mesh that is not exact is the better, the smaller its largest error
 WANDER = 0.7  # chance to go on from a hop that was not exact, while nothing is
 SECONDS_PER_FACE = 0.06
@@ -100,13 +102,22 @@ class PaletteSolver:
         """The starts, in parallel, and the best of them.
 
         Raises:
-            SpecError: no labelling of this mesh has only allowed triangles.
+            SpecError: too many faces or classes, or no labelling of this mesh has only allowed triangles.
         """
+        if len(mesh.faces) > MOST_FACES:
+            raise SpecError(
+                f"{len(mesh.faces)} faces are too many for the palette solver",
+                wanted=f"at most {MOST_FACES} faces",
+                found=f"{len(mesh.faces)}",
+                remedy="fewer --faces, or --method pressure",
+            )
         began, scale = time.monotonic(), mesh.mean_edge
         unit = mesh.scaled(1 / scale)
+        with threadpool_limits(1):
+            palette = palette_for(unit, self.spec.classes, np.random.default_rng([self.spec.seed, 0, STARTS]))
         problem = Problem(
             Target(self.surface.scaled(1 / scale)),
-            palette_of_classes(self.spec.classes),
+            palette,
             "all" if mesh.genus == 0 else "none",
             mesh.genus == 0,
         )
@@ -184,25 +195,16 @@ class PaletteSolver:
 
 
 def first_frame(mesh: TriMesh, palette: Palette, number: int, rng: np.random.Generator) -> Framework:
-    """Nearest labels, repaired, with lengths of the palette's ratios that keep the mean edge.
+    """First labels, with lengths of the palette's ratios that keep the mean edge.
 
     Raises:
-        SpecError: the repair finds no allowed labelling.
+        SpecError: no labelling of this mesh has only allowed triangles.
     """
-    if palette.size == 2:
+    if palette.size == 2 and len(palette.multisets) > 1:
         palette = replace(palette, ratios=(1.0, START_RATIOS[number % len(START_RATIOS)]))
     ratios = np.array(palette.ratios)
-    lengths = ratios * float(mesh.mean_edge / ratios.mean())
-    for _ in range(LABEL_TRIALS):
-        labels = repaired(mesh, nearest_labels(mesh, lengths), palette, lengths, rng)
-        if labels is not None:
-            return Framework(mesh, labels, palette.lengths(mesh.mean_edge, labels))
-    raise SpecError(
-        "no labelling of this mesh has only allowed triangles",
-        wanted=f"triangles of {len(palette.multisets)} kinds",
-        found=f"none after {LABEL_TRIALS} trials",
-        remedy="other --classes or --faces",
-    )
+    labels = first_labels(mesh, palette, ratios * float(mesh.mean_edge / ratios.mean()), rng)
+    return Framework(mesh, labels, palette.lengths(mesh.mean_edge, labels))
 
 
 def _rank(found: Found) -> tuple[bool, float]:
@@ -214,10 +216,11 @@ def _rank_of_start(pair: tuple[Framework, Found]) -> tuple[bool, float]:
 
 
 def _judged(frame: Framework, yardstick: Yardstick) -> Found:
-    exact = frame.worst < EXACT and (np.diff(frame.lengths) > 0).all() and len(self_intersections(frame.mesh)) == 0
+    apart = bool((frame.lengths[1:] > LEAST_RATIO * frame.lengths[:-1]).all())
+    exact = frame.worst < EXACT and apart and len(self_intersections(frame.mesh)) == 0
     quality = yardstick.quality(frame.mesh)
     score = yardstick.score(quality)
-    return Found(frame, bool(exact), score if exact else score + UNIT_ERROR * frame.worst, quality)
+    return Found(frame, exact, score if exact else score + UNIT_ERROR * frame.worst, quality)
 
 
 def _somewhere(frame: Framework, rng: np.random.Generator) -> Ints:
