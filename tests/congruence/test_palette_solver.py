@@ -2,9 +2,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from drkid.congruence import decompose
+from drkid.congruence import decompose, palette_solver
 from drkid.congruence.palette_solver import PaletteSolver
 from drkid.congruence.solver import run
+from drkid.errors import SpecError
 from drkid.intersection import self_intersections
 from drkid.mesh import TriMesh
 from drkid.spec import KitSpec
@@ -91,3 +92,26 @@ def test_a_surface_with_a_handle_is_solved_as_far_as_it_goes():
     assert isinstance(found.mesh, TriMesh)
     assert found.mesh.mean_edge == pytest.approx(ring.mean_edge, rel=0.1)
     assert 100 * found.face_errors.max() / found.mesh.mean_edge < 10
+
+
+@pytest.mark.parametrize("classes", [1, 6])
+def test_other_numbers_of_classes(pebble, classes):
+    found = decompose(pebble, KitSpec(method="palette", classes=classes, rounds=3, tolerance_percent=5))
+    assert len(found.class_lengths) <= classes
+    assert len(np.unique(found.class_lengths.round(9))) <= 3
+    assert found.mesh.is_closed_manifold
+    assert 100 * found.face_errors.max() / found.mesh.mean_edge < 5
+
+
+def test_a_large_mesh_is_annealed_by_patches(pebble, monkeypatch):
+    monkeypatch.setattr(palette_solver, "MOST_DENSE_FACES", 60)
+    found = decompose(pebble, KitSpec(method="palette", classes=4, tolerance_percent=0.001))
+    assert found.iterations == 0
+    assert found.mesh.is_closed_manifold
+    assert len(found.mesh.faces) == len(pebble.faces)
+    assert 100 * found.face_errors.max() / found.mesh.mean_edge < 8
+
+
+def test_more_classes_than_palettes_have_are_refused(pebble):
+    with pytest.raises(SpecError, match="11 classes"):
+        decompose(pebble, KitSpec(method="palette", classes=11))

@@ -16,16 +16,16 @@ from typing import TypeVar
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from drkid.congruence.block_anneal import sparse_exactly, sparse_start
 from drkid.congruence.framework import Framework
 from drkid.congruence.hop import Problem, edges_around, exactly, hop, start
 from drkid.congruence.labelling import first_labels
-from drkid.congruence.palette import Palette
+from drkid.congruence.palette import Palette, palette_of_classes
 from drkid.congruence.palette_subset import palette_for
 from drkid.congruence.score import Quality, Yardstick
 from drkid.congruence.solver import Candidate
 from drkid.congruence.target import Target
 from drkid.congruence.triangle_space import ascending_lengths, clustering_error
-from drkid.errors import SpecError
 from drkid.intersection import self_intersections
 from drkid.kit import Convergence, Outcome
 from drkid.mesh import Ints, TriMesh, read_only
@@ -34,7 +34,7 @@ from drkid.spec import KitSpec
 EXACT = 1e-9  # largest edge error, of the mean edge, that counts as exact
 START_RATIOS = (1.17, 1.15, 1.19)  # of two lengths, tried in turn
 STARTS, TASKS_PER_ROUND = 6, 4
-MOST_FACES = 800  # the dense model takes memory as the square of the faces, and time as the cube
+MOST_DENSE_FACES = 800  # beyond, the dense model takes too long: patches and sparse solves, and no hops
 LEAST_RATIO = 1.03  # between neighbouring lengths of the palette: nearer ones are one length to a hand
 UNIT_ERROR = 100.0  # a mesh that is not exact is the better, the smaller its largest error
 WANDER = 0.7  # chance to go on from a hop that was not exact, while nothing is
@@ -72,6 +72,11 @@ class PaletteState:
     history: tuple[Convergence, ...]
 
     @property
+    def large(self) -> bool:
+        """Too large for the dense model, and so for hops."""
+        return len(self.found.frame.mesh.faces) > MOST_DENSE_FACES
+
+    @property
     def iteration(self) -> int:
         """Rounds done."""
         return self.round
@@ -102,19 +107,13 @@ class PaletteSolver:
         """The starts, in parallel, and the best of them.
 
         Raises:
-            SpecError: too many faces or classes, or no labelling of this mesh has only allowed triangles.
+            SpecError: too many classes, or no labelling of this mesh has only allowed triangles.
         """
-        if len(mesh.faces) > MOST_FACES:
-            raise SpecError(
-                f"{len(mesh.faces)} faces are too many for the palette solver",
-                wanted=f"at most {MOST_FACES} faces",
-                found=f"{len(mesh.faces)}",
-                remedy="fewer --faces, or --method pressure",
-            )
         began, scale = time.monotonic(), mesh.mean_edge
         unit = mesh.scaled(1 / scale)
+        large = len(mesh.faces) > MOST_DENSE_FACES
         with threadpool_limits(1):
-            palette = palette_for(unit, self.spec.classes, np.random.default_rng([self.spec.seed, 0, STARTS]))
+            palette = self._palette(unit, large)
         problem = Problem(
             Target(self.surface.scaled(1 / scale)),
             palette,
@@ -125,17 +124,25 @@ class PaletteSolver:
 
         def begin(number: int) -> tuple[Framework, Found]:
             rng = np.random.default_rng([self.spec.seed, 0, number])
-            soft = start(first_frame(unit, problem.palette, number, rng), problem, rng)
+            first = first_frame(unit, problem.palette, number, rng)
+            if large:
+                return _large_start(first, problem, yardstick, rng)
+            soft = start(first, problem, rng)
             return soft, _judged(exactly(soft, problem), yardstick)
 
         with threadpool_limits(1):
-            results = _in_parallel([lambda n=n: begin(n) for n in range(STARTS)])
+            results = _in_parallel([lambda n=n: begin(n) for n in range(1 if large else STARTS)])
         softs = sorted(results, key=_rank_of_start)
         best = softs[0][1]
         state = PaletteState(
             scale, problem, yardstick, best, tuple(soft for soft, _ in softs[:TASKS_PER_ROUND]), 0, began, ()
         )
         return replace(state, history=(_recorded(state),))
+
+    def _palette(self, unit: TriMesh, large: bool) -> Palette:
+        if large:
+            return palette_of_classes(self.spec.classes)
+        return palette_for(unit, self.spec.classes, np.random.default_rng([self.spec.seed, 0, STARTS]))
 
     def step(self, state: PaletteState) -> PaletteState:
         """One round: hops from the best exact mesh, or from where each search stands while none is exact."""
@@ -175,7 +182,8 @@ class PaletteSolver:
         if state.found.exact:
             return Outcome("converged", f"exact: largest error {percent:.1g} % {after}")
         status = "converged" if percent <= self.spec.tolerance_percent else "stalled"
-        return Outcome(status, f"not exact: largest error {percent:.3g} % {after}; more --seconds or --classes help")
+        more = "--classes" if state.large else "--seconds or --classes"
+        return Outcome(status, f"not exact: largest error {percent:.3g} % {after}; more {more} may help")
 
     def told(self, state: PaletteState) -> str:
         """Exact or not, T, d_H and the 95th percentile of the dihedrals."""
@@ -187,7 +195,9 @@ class PaletteSolver:
         )
 
     def fraction(self, state: PaletteState) -> float:
-        """Rounds or seconds used, of those given."""
+        """Rounds or seconds used, of those given; a large mesh is not hopped on."""
+        if state.large:
+            return 1.0
         if self.spec.rounds is not None:
             return state.round / self.spec.rounds
         seconds = self.spec.seconds or max(10.0, SECONDS_PER_FACE * len(state.best.mesh.faces))
@@ -205,6 +215,15 @@ def first_frame(mesh: TriMesh, palette: Palette, number: int, rng: np.random.Gen
     ratios = np.array(palette.ratios)
     labels = first_labels(mesh, palette, ratios * float(mesh.mean_edge / ratios.mean()), rng)
     return Framework(mesh, labels, palette.lengths(mesh.mean_edge, labels))
+
+
+def _large_start(
+    first: Framework, problem: Problem, yardstick: Yardstick, rng: np.random.Generator
+) -> tuple[Framework, Found]:
+    """A mesh too large for the dense model: annealed by patches, solved sparsely."""
+    workers = os.cpu_count() or 1
+    soft = sparse_start(first, problem.target, problem.palette, problem.freedom, rng, workers=workers)
+    return soft, _judged(sparse_exactly(soft, problem.target, problem.freedom, square=problem.square), yardstick)
 
 
 def _rank(found: Found) -> tuple[bool, float]:
