@@ -86,6 +86,25 @@ def _figures(row: dict) -> list[str]:
     ]
 
 
+def congruence() -> str:
+    """The palette solver and the pressure solver on the same meshes."""
+    rows = [
+        [
+            r["shape"].split(".")[0].replace("_", " "),
+            f"{r['method']}, k = {r['classes']}",
+            "exact" if r["exact"] else f"{r['error_max_percent']:.2g}",
+            "{:.2f} / {:.2f}".format(*r["simplified_assembled_percent"]),
+            "{:.2f} / {:.2f}".format(*r["surface_assembled_percent"]),
+            "{:.0f} ({:.0f})".format(*r["dihedral_p95_degrees"]),
+            "{:.0f} ({:.0f})".format(*r["concave_percent"]),
+            f"{r['seconds']:.1f}",
+        ]
+        for r in json.loads((RESULTS / "congruence.json").read_text())
+    ]
+    head = ["shape", "solver", "T %", "d_H(M_s, M_f)", "d_H(M_i, M_f)", "dihedral p95 °", "concave %", "s"]
+    return table(head, rows)
+
+
 def choices() -> str:
     """What the open choices do."""
     rows = []
@@ -201,7 +220,8 @@ def thickening() -> str:
 
 
 TABLES = {
-    made.__name__: made for made in (paper, choices, faces, classes, processes, density, make, inspect, thickening)
+    made.__name__: made
+    for made in (paper, choices, congruence, faces, classes, processes, density, make, inspect, thickening)
 }
 
 

@@ -94,7 +94,7 @@ def test_toml_is_a_spec(text):
     assert KitSpec.parse(tomllib.loads(text))
 
 
-@pytest.mark.parametrize("name", ["paper", "choices"])
+@pytest.mark.parametrize("name", ["paper", "choices", "congruence"])
 def test_tables_are_those_of_the_benchmarks(name):
     tables = load_script(REPOSITORY / "docs" / "make_tables.py")
     page = (REPOSITORY / "docs" / "comparison-with-the-paper.md").read_text()

@@ -11,7 +11,7 @@ but what is beyond it costs no more than a shift along the flex. Relabellings ar
 the quadratic model for all others, and taken when the true merit falls.
 """
 
-import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import combinations, product
 from typing import NamedTuple
@@ -231,18 +231,13 @@ def fast_model(frame: Framework, at: SparseLinearisation, modes: SlowModes, weig
 
 @dataclass(frozen=True, eq=False)
 class Repair:
-    """What stays the same while folds of one connectivity are repaired; `deadline` is a `time.monotonic()`."""
+    """What stays the same while folds of one connectivity are repaired; `over` is asked before each trial."""
 
     target: Target
     palette: Palette
     freedom: Freedom
     moves: Relabellings
-    deadline: float
-
-    @property
-    def over(self) -> bool:
-        """Has the time run out?"""
-        return time.monotonic() >= self.deadline
+    over: Callable[[], bool]
 
     def priced(self, frame: Framework, weight: float) -> tuple[Floats, Floats]:
         """(n,): the modelled change of merit / weight² by each relabelling; and the fast model's `answer`."""
@@ -292,7 +287,7 @@ class Repair:
         spread = float(np.abs(np.partition(prices, TRIALS)[:TRIALS]).mean())
         noisy = prices + heat * spread * rng.standard_normal(len(prices))
         for move in np.argsort(noisy)[:TRIALS].tolist():
-            if self.over or not np.isfinite(prices[move]):
+            if self.over() or not np.isfinite(prices[move]):
                 return None
             other, value = self.tried(self.relabelled(frame, move, answer), merit, weight)
             if value < (1 - LEAST_GAIN) * merit:
@@ -305,24 +300,25 @@ def repair(
     target: Target,
     palette: Palette,
     rng: np.random.Generator,
-    deadline: float,
+    over: Callable[[], bool],
     freedom: Freedom = "all",
 ) -> Framework:
-    """Relabel until the mesh is exact or the time is over: the most exact framework met.
+    """Relabel until the mesh is exact or `over` says so: the most exact framework met.
 
-    `deadline` is a `time.monotonic()`; what comes back is never less exact than Newton's method makes what came.
+    `over` is asked before each trial, so that it can count them or look at a clock. What comes back is never less exact
+    than Newton's method makes what came.
 
     Raises:
         numpy.linalg.LinAlgError: the mesh is degenerate from the start.
     """
-    task = Repair(target, palette, freedom, relabellings(frame.mesh, palette.size), deadline)
+    task = Repair(target, palette, freedom, relabellings(frame.mesh, palette.size), over)
     best, heat, kicks = min(frame, sparse_exact(frame, freedom), key=lambda one: one.worst), 0.0, 0
-    while not task.over and best.worst >= EXACT:
+    while not task.over() and best.worst >= EXACT:
         for weight in LEVELS:
             frame = _descended(task, frame, weight, heat, kicks if weight == LEVELS[0] else 0, rng)
             solved = sparse_exact(frame, freedom)
             best = min(best, solved, key=lambda one: one.worst)
-            if best.worst < EXACT or task.over:
+            if best.worst < EXACT or task.over():
                 return best
         heat, kicks = NOISE, KICKS
     return best
@@ -333,7 +329,7 @@ def _descended(
 ) -> Framework:
     """Relabelled at one weight until nothing tried helps, after some kicks that may make it worse."""
     frame, merit = task.settled(frame, weight)
-    while not task.over:
+    while not task.over():
         found = task.improved(frame, KICK * merit if kicks > 0 else merit, weight, heat, rng)
         kicks -= 1
         if found is None:
