@@ -53,6 +53,7 @@ check: lint types layers test
 benchmarks: $(VENV)/.run
 	$(BIN)/python benchmarks/paper_table.py
 	$(BIN)/python benchmarks/pressure_choices.py
+	$(BIN)/python benchmarks/congruence.py --classes 2
 
 clean:
 	rm -rf $(VENV) demo-kit .pytest_cache .ruff_cache .hypothesis .coverage
