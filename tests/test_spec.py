@@ -2,8 +2,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import drkid
 from drkid.errors import SpecError
-from drkid.spec import PROCESSES, KitSpec
+from drkid.spec import PROCESSES, UNIVERSAL, UNIVERSAL_BEVEL, KitSpec, multiset_words
 
 
 @pytest.mark.parametrize(
@@ -20,6 +21,30 @@ from drkid.spec import PROCESSES, KitSpec
         ({"spacing": "1,2"}, ["spacing"]),
         ({"spacing": "1,2,0"}, ["spacing", "greater than 0"]),
         ({"colour": 1}, ["no parameter colour"]),
+        ({"palette": "short,long"}, ["palette", "universal", "30,35.1", "short,long"]),
+        ({"palette": "30"}, ["palette", "two or three", "not 1"]),
+        ({"palette": [20, 25, 30, 35]}, ["palette", "two or three", "not 4"]),
+        ({"palette": "35.1,30"}, ["palette", "ascending", "35.1,30"]),
+        ({"palette": "30,30.8"}, ["palette", "1.03 times"]),
+        ({"palette": "30,49"}, ["palette", "1.6 times"]),
+        ({"palette": "30,36,49"}, ["palette", "1.6 times"]),
+        ({"palette": "0,30"}, ["palette", "greater than 0"]),
+        ({"palette": "nan,30"}, ["palette", "finite"]),
+        ({"palette": "30,35", "like": "kit"}, ["like and palette are both given"]),
+        ({"multisets": "ssl", "like": "kit"}, ["like and multisets are both given"]),
+        ({"palette": "30,35", "method": "pressure"}, ["palette is given", "pressure", "--method palette"]),
+        ({"like": "kit", "method": "pressure"}, ["like is given", "pressure"]),
+        ({"multisets": "ssl,sll", "method": "pressure"}, ["multisets is given", "pressure"]),
+        ({"palette": "30,35", "classes": 5}, ["classes is 5", "4 kinds of triangles at most"]),
+        ({"palette": "30,35,40", "classes": 11}, ["classes is 11", "10 kinds of triangles at most"]),
+        ({"multisets": "ssl,sll", "classes": 3}, ["classes is 3", "are 2", "not both"]),
+        ({"multisets": "aab,abc", "palette": "30,35"}, ["aab,abc name 3 lengths", "palette gives 2"]),
+        ({"multisets": "short"}, ["multisets", "three letters", "short"]),
+        ({"multisets": "sss"}, ["multisets", "each length occurs", "l does not"]),
+        ({"multisets": "aab,abb"}, ["multisets", "c does not"]),
+        ({"bevel_degrees": "60"}, ["bevel_degrees", "60"]),
+        ({"bevel_degrees": "60,170"}, ["bevel_degrees", "130"]),
+        ({"bevel_degrees": "60,90", "thickening": "mean_normal"}, ["bevel_degrees", "mean_normal", "bisector"]),
     ],
 )
 def test_what_cannot_be_used_is_named(values, words):
@@ -58,6 +83,52 @@ def test_every_field_has_help_and_a_group():
 def test_a_spec_survives_the_way_through_json():
     spec = KitSpec(faces=100, spacing=(1, 2, 3), seed=5)
     assert KitSpec.parse(spec.model_dump(mode="json")) == spec
+
+
+@pytest.mark.parametrize(
+    ("values", "classes", "multisets"),
+    [
+        ({"palette": "30,35"}, 2, None),
+        ({"palette": (30, 35), "classes": 4}, 4, None),
+        ({"palette": "30,33,36"}, 10, None),
+        ({"palette": [30, 33, 36], "classes": 6}, 6, None),
+        ({"multisets": " SLL, lss,sll"}, 2, "ssl,sll"),
+        ({"multisets": "lss", "palette": "universal"}, 1, "ssl"),
+        ({"multisets": "cba,caa,bab"}, 3, "aac,abb,abc"),
+    ],
+)
+def test_lengths_and_triangles_from_outside_choose_solver_and_classes(values, classes, multisets):
+    spec = KitSpec.parse(values)
+    assert (spec.method, spec.classes, spec.multisets) == ("palette", classes, multisets)
+    assert KitSpec.parse(spec.model_dump(mode="json")) == spec
+
+
+def test_a_kit_to_be_like_chooses_the_solver_but_tells_its_classes_later():
+    spec = KitSpec.parse({"like": "kits/mito"})
+    assert spec.method == "palette"
+    assert "classes" not in spec.model_fields_set
+    assert KitSpec.parse(spec.model_dump(mode="json", exclude_unset=True)) == spec
+
+
+def test_given_lengths_are_bevelled_for_any_shape_unless_told_otherwise():
+    assert KitSpec.parse({"palette": "universal"}).bevel_degrees == UNIVERSAL_BEVEL
+    assert KitSpec.parse({"palette": "universal", "bevel_degrees": "30,45"}).bevel_degrees == (30, 45)
+    assert KitSpec.parse({"palette": "universal", "thickening": "perpendicular"}).bevel_degrees is None
+    assert KitSpec.parse({"multisets": "ssl"}).bevel_degrees is None
+    assert KitSpec().bevel_degrees is None
+
+
+def test_the_universal_pair_has_a_name_and_a_ratio_near_1_17():
+    assert KitSpec.parse({"palette": " Universal "}).palette == drkid.UNIVERSAL == UNIVERSAL
+    assert UNIVERSAL[1] / UNIVERSAL[0] == pytest.approx(1.17, abs=0.005)
+
+
+@given(st.lists(st.sampled_from(["ssl", "sll", "sss", "lll", "lsl", "LLS"]), min_size=1))
+def test_words_of_triangles_are_put_in_order_once(words):
+    found = multiset_words(",".join(words))
+    assert len(found) == len({"".join(sorted(word.lower())) for word in words})
+    assert multiset_words(",".join(found)) == found
+    assert all(word == "s" * word.count("s") + "l" * word.count("l") for word in found)
 
 
 def test_processes_agree_with_their_own_rods():

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from drkid import verification
 from drkid.errors import KitFolderError
 from drkid.export.ply import ply_bytes
 from drkid.export.stl import stl_bytes
@@ -71,6 +72,14 @@ def farther(document):
     document["metrics"]["hausdorff"]["surface_assembled"]["max_percent"] += 0.1
 
 
+def stiffer(document):
+    document["metrics"]["rigidity"]["stiffness_percent"] *= 1.01
+
+
+def with_another_softest_mode(document):
+    document["metrics"]["rigidity"]["softest"] += 1e-3
+
+
 @pytest.mark.parametrize(
     ("change", "name"),
     [
@@ -84,11 +93,28 @@ def farther(document):
         (other_status, "outcome"),
         (one_part_more, "counts"),
         (farther, "d_H surface_assembled max, %"),
+        (stiffer, "stiffness, %"),
+        (with_another_softest_mode, "softest mode"),
     ],
 )
 def test_a_false_statement_is_found(copy, change, name):
     edit(copy, change)
     assert name in failures(copy)
+
+
+def test_a_kit_that_states_no_rigidity_is_not_asked_for_it(copy):
+    edit(copy, lambda document: document["metrics"].pop("rigidity"))
+    found = verify_kit(copy)
+    assert found.passed
+    assert "softest mode" not in {check.name for check in found.checks}
+
+
+def test_an_assembly_whose_rigidity_cannot_be_computed_fails(copy, monkeypatch):
+    def degenerate(_mesh):
+        raise np.linalg.LinAlgError("an edge has no length")
+
+    monkeypatch.setattr(verification, "rigidity", degenerate)
+    assert failures(copy) == {"rigidity"}
 
 
 def test_a_surface_with_a_hole_is_found(copy, kit):

@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from drkid.errors import DrkidError
     from drkid.kit import Kit
     from drkid.pipeline import make_kit
-    from drkid.spec import KitSpec
+    from drkid.spec import UNIVERSAL, KitSpec
 
 __version__ = "0.1.0"
-__all__ = ["DrkidError", "Kit", "KitSpec", "__version__", "make_kit"]
+__all__ = ["UNIVERSAL", "DrkidError", "Kit", "KitSpec", "__version__", "make_kit"]
 
-_HOMES = {"DrkidError": "errors", "Kit": "kit", "KitSpec": "spec", "make_kit": "pipeline"}
+_HOMES = {"DrkidError": "errors", "Kit": "kit", "KitSpec": "spec", "UNIVERSAL": "spec", "make_kit": "pipeline"}
 
 
 def __getattr__(name: str) -> Any:

@@ -14,8 +14,10 @@ from drkid.errors import SpecError
 from drkid.spec import KitSpec
 from drkid.terminal import StageLines, show_inspection, show_json, show_kit, show_verification
 
+PALETTE = {"palette", "like", "multisets"}  # lengths and triangles from outside
 STALLED = 3  # exit status: the kit is written, but the asked tolerance was not reached
 NOT_AS_STATED = 1  # exit status of `check` for a kit whose files do not bear out its numbers
+TYPED_AS_TEXT = ("spacing", "bed_mm", "palette", "bevel_degrees")  # lists, which a person types as one word
 GROUPS = ("Input", "Mesh", "Congruence", "Pieces")  # in the order in which help shows them
 
 # ---- flags from KitSpec
@@ -27,7 +29,7 @@ def _spec_parameters() -> list[inspect.Parameter]:
     for name, field in KitSpec.model_fields.items():
         extra = field.json_schema_extra
         group = str(extra["group"]) if isinstance(extra, dict) else GROUPS[0]
-        annotation: Any = str if name in ("spacing", "bed_mm") else field.annotation
+        annotation: Any = str if name in TYPED_AS_TEXT else field.annotation
         default = "" if field.default is None else f" [default: {_shown(field.default)}]"
         option = Parameter(
             help=f"{field.description}{default}", group=Group(group, sort_key=GROUPS.index(group)), show_default=False
@@ -57,11 +59,25 @@ def _spec(file: Path | None, flags: dict[str, Any]) -> KitSpec:
     """Parameters of a file, then what was given on the command line over them."""
     values = {} if file is None else _spec_file(file)
     given = {name: value for name, value in flags.items() if value is not None}
-    if "vertices" in given and "faces" not in given:
-        values.pop("faces", None)
-    if "faces" in given and "vertices" not in given:
-        values.pop("vertices", None)
-    return KitSpec.parse(values | given)
+    replaced = _replaced(values, given)
+    return KitSpec.parse({name: value for name, value in values.items() if name not in replaced} | given)
+
+
+def _replaced(values: dict[str, Any], given: dict[str, Any]) -> set[str]:
+    """Parameters of a file that no longer hold because a flag takes their place, or what follows from them changes."""
+    replaced = {"vertices"} if "faces" in given else {"faces"} if "vertices" in given else set[str]()
+    if "classes" in given:
+        replaced.add("multisets")
+    if given.get("method", "palette") != "palette":
+        return replaced | PALETTE
+    if given.keys() & {"palette", "like"}:
+        replaced |= {*PALETTE, "method", "classes", "size_mm", "bevel_degrees"}
+    elif "multisets" in given:
+        replaced |= {"method", "classes"}
+    lengths_given = any((values | given).get(name) is not None for name in ("palette", "like"))
+    if lengths_given and "size_mm" in given and not given.keys() & {"faces", "vertices"}:
+        replaced |= {"faces", "vertices"}
+    return replaced
 
 
 def _spec_file(path: Path) -> dict[str, Any]:
@@ -117,6 +133,8 @@ def make(
         drkid make
         drkid make mitochondrion.nii.gz --faces 172 --classes 7 --out mito
         drkid make labels.tif --label 12 --size-mm 250 --process sla
+        drkid make vesicle.mrc --palette universal --size-mm 300
+        drkid make other.stl --like mito --out other
         drkid make density.mrc --threshold 0.3 --spacing 5.7,5.7,5.7 --unit angstrom
     """
     spec = _spec(spec_file, flags)

@@ -15,6 +15,7 @@ from drkid.spec import ConnectorKind, KitSpec, Unit
 VolumeKind = Literal["labels", "mask", "density"]
 Handedness = Literal["any", "left", "right"]
 Status = Literal["converged", "stalled"]
+Firmness = Literal["stiff", "soft", "may snap through"]
 
 
 def class_id(index: int) -> str:
@@ -102,11 +103,34 @@ class Convergence:
     error_mean_percent: float
 
 
+@dataclass(frozen=True)
+class Rigidity:
+    """How stiff the assembled shell is; movements are those of the most moved vertex, in percent of the mean edge.
+
+    `softest` is the least singular value of the rigidity matrix apart from the rigid motions, `stiffness_percent` the
+    same of that of a round shell of as many faces. `sway_percent` is what play of 0.5 % of the mean edge in every
+    length allows along that mode (100: or more). At `fold_percent` along one of the softest modes the shell gives way
+    to a second state, if play or force lets every length give by `barrier_percent` of the mean edge: the mode that
+    snaps through, or else the one with the lowest barrier; None where there is none near. `second_state_percent` is
+    how far the second state is, where there is one that play alone may reach.
+    """
+
+    firmness: Firmness
+    softest: float
+    stiffness_percent: float
+    sway_percent: float
+    fold_percent: float | None = None
+    barrier_percent: float | None = None
+    second_state_percent: float | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Decomposition:
     """M_f and its classes: `face_class` (F,) into `class_lengths` (k, 3), ascending edge lengths.
 
     `face_errors` (F,) is the Euclidean distance of a face's ascending edge lengths to its class's.
+    `scale_mm_per_unit` is the printed scale where lengths that are given in mm fix it. `rigidity` is None where it was
+    not measured.
     """
 
     mesh: TriMesh
@@ -117,6 +141,8 @@ class Decomposition:
     convergence: tuple[Convergence, ...]
     outcome: Outcome
     notes: tuple[str, ...] = ()
+    scale_mm_per_unit: float | None = None
+    rigidity: Rigidity | None = None
 
 
 @dataclass(frozen=True)
@@ -250,6 +276,7 @@ class Metrics:
     groove_max_mm: float
     genus: int
     iterations: int
+    rigidity: Rigidity | None = None
     seconds: dict[str, float] = field(default_factory=dict)
 
 

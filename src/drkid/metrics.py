@@ -46,5 +46,6 @@ def measure_kit(
         groove_max_mm=float(part_set.groove_mm.max()),
         genus=mesh.genus,
         iterations=decomposition.iterations,
+        rigidity=decomposition.rigidity,
         seconds=seconds,
     )

@@ -12,8 +12,9 @@ from drkid.data import nucleus_path
 from drkid.export import write_kit
 from drkid.formats import is_mesh_path
 from drkid.intersection import self_intersections
-from drkid.kit import Decomposition, Kit, PartSet, Surface
+from drkid.kit import Decomposition, Kit, PartSet, Simplified, Surface
 from drkid.metrics import measure_kit
+from drkid.moulds import corrected_faces, faces_at_size, require_agreement, size_notes, with_moulds_of
 from drkid.parts import make_parts
 from drkid.progress import Progress, silent
 from drkid.remesh import simplify
@@ -46,7 +47,7 @@ def make_kit(source: str | Path | None = None, spec: KitSpec | None = None, prog
     Raises:
         DrkidError: a file that cannot be used, or parameters that cannot be met; says what to try.
     """
-    spec = KitSpec() if spec is None else spec
+    spec = with_moulds_of(KitSpec() if spec is None else spec)
     seconds: dict[str, float] = {}
 
     @contextmanager
@@ -60,7 +61,7 @@ def make_kit(source: str | Path | None = None, spec: KitSpec | None = None, prog
     with stage("surface") as told:
         surface = read_surface(source, spec, told)
     with stage("remesh") as told:
-        simplified = simplify(surface, spec, told)
+        spec, simplified = _simplified(surface, spec, told)
     with stage("congruence") as told:
         decomposition = decompose(simplified.mesh, spec, told, surface.mesh)
     with stage("parts") as told:
@@ -81,7 +82,14 @@ def make_kit(source: str | Path | None = None, spec: KitSpec | None = None, prog
         part_set=part_set,
         assembly=assembly,
         metrics=replace(metrics, seconds=seconds),
-        notes=(*surface.notes, *simplified.notes, *printed.notes, *part_set.notes, *_crossings(printed)),
+        notes=(
+            *surface.notes,
+            *simplified.notes,
+            *printed.notes,
+            *part_set.notes,
+            *size_notes(spec, printed.mesh),
+            *_crossings(printed),
+        ),
         writer=write_kit,
     )
 
@@ -96,6 +104,23 @@ def read_surface(source: str | Path | None, spec: KitSpec, progress: Progress = 
     return extract_surface(path if is_mesh_path(path) else read_volume(path, spec), spec, progress)
 
 
+def _simplified(surface: Surface, spec: KitSpec, progress: Progress) -> tuple[KitSpec, Simplified]:
+    """M_s, and the spec with the number of faces where it follows from given lengths and a size."""
+    if spec.palette is None or spec.size_mm is None:
+        return spec, simplify(surface, spec, progress)
+    if spec.faces is not None or spec.vertices is not None:
+        simplified = simplify(surface, spec, progress)
+        require_agreement(simplified.mesh, spec)
+        return spec, simplified
+    spec = spec.model_copy(update={"faces": faces_at_size(surface.mesh, spec)})
+    simplified = simplify(surface, spec, progress)
+    better = corrected_faces(simplified.mesh, spec)
+    if better == spec.faces:
+        return spec, simplified
+    spec = spec.model_copy(update={"faces": better})
+    return spec, simplify(surface, spec, progress)
+
+
 def _scaled(decomposition: Decomposition, scale: float) -> Decomposition:
     """In millimetres of the printed object."""
     return replace(
@@ -103,6 +128,7 @@ def _scaled(decomposition: Decomposition, scale: float) -> Decomposition:
         mesh=decomposition.mesh.scaled(scale),
         class_lengths=decomposition.class_lengths * scale,
         face_errors=decomposition.face_errors * scale,
+        scale_mm_per_unit=None if decomposition.scale_mm_per_unit is None else 1.0,
     )
 
 
@@ -122,7 +148,7 @@ def _resolved(spec: KitSpec, surface: Surface, printed: Decomposition, part_set:
             "spacing": source.voxel_size,
             "unit": source.voxel_unit,
             "faces": None if spec.vertices is not None else spec.faces or DEFAULT_FACES,
-            "size_mm": round(float(printed.mesh.extents.max()), 9),
+            "size_mm": None if spec.palette is not None else round(float(printed.mesh.extents.max()), 9),
             "thickness_mm": dimensions.thickness_mm,
             "clearance_mm": dimensions.clearance_mm,
             "rod_clearance_mm": dimensions.rod_clearance_mm,

@@ -1,9 +1,11 @@
 """KitSpec: every parameter with unit, default, limits and help. Flags, JSON Schema and documents come from it."""
 
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any, Literal, cast
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from drkid.errors import SpecError
 
@@ -14,6 +16,16 @@ ConnectorKind = Literal["hinge", "box", "none"]
 Unit = Literal["angstrom", "nm", "um", "mm"]
 
 DEFAULT_FACES = 172  # the size of the paper's printed mitochondrion (table 1, M4)
+
+UNIVERSAL = (32.0, 37.5)
+"""Two edge lengths in mm of which every organic shape can be built: ratio 1.17, room for every process's connectors."""
+
+UNIVERSAL_BEVEL = (60.0, 90.0)
+"""Concave and convex bends in degrees that pieces of given lengths are bevelled for: they then fit any shape."""
+
+LEAST_RATIO, MOST_RATIO = 1.03, 1.6  # of given lengths: nearer ones are one length to a hand, others make slivers
+MOST_CLASSES = {2: 4, 3: 10}  # of a palette of two or three lengths
+MULTISETS = {1: "ssl", 2: "ssl,sll", 3: "sss,ssl,sll", 4: "sss,ssl,sll,lll"}  # of two lengths, by number of classes
 
 
 @dataclass(frozen=True)
@@ -51,7 +63,67 @@ def _split_commas(value: object) -> object:
     return value.lower().replace("x", ",").split(",") if isinstance(value, str) else value
 
 
+def _lengths(value: object) -> object:
+    """'30,35.1' or 'universal' as lengths in mm."""
+    if not isinstance(value, str):
+        return value
+    if value.strip().lower() == "universal":
+        return UNIVERSAL
+    try:
+        return [float(word) for word in value.split(",")]
+    except ValueError:
+        message = "the word universal, or two or three lengths in mm such as 30,35.1"
+        raise ValueError(message) from None
+
+
+def _distinct(lengths: tuple[float, ...]) -> tuple[float, ...]:
+    if len(lengths) not in MOST_CLASSES:
+        message = f"two or three lengths in mm, not {len(lengths)}"
+        raise ValueError(message)
+    near = any(b < LEAST_RATIO * a for a, b in pairwise(lengths))
+    if near or lengths[-1] > MOST_RATIO * lengths[0]:
+        message = (
+            f"ascending lengths, each at least {LEAST_RATIO:g} times the one before "
+            f"and none more than {MOST_RATIO:g} times the first"
+        )
+        raise ValueError(message)
+    return lengths
+
+
+def letters_of(words: tuple[str, ...]) -> str:
+    """The letters that name the lengths of a palette, ascending: 'sl' or 'abc'."""
+    return "sl" if set("".join(words)) <= set("sl") else "abc"
+
+
+def multiset_words(text: str) -> tuple[str, ...]:
+    """Words such as 'ssl,sll' or 'aab,abc,bcc': each once, its letters and the words in ascending order of length.
+
+    Raises:
+        ValueError: a word is not three letters of s and l or of a, b, c; says what is wanted.
+    """
+    words = [word.strip().lower() for word in text.split(",") if word.strip()]
+    letters = letters_of(tuple(words))
+    if not words or any(len(word) != 3 or not set(word) <= set(letters) for word in words):
+        message = "words of three letters, all of s and l or all of a, b and c, separated by commas"
+        raise ValueError(message)
+    ranks = sorted({tuple(sorted(letters.index(c) for c in word)) for word in words})
+    return tuple("".join(letters[i] for i in rank) for rank in ranks)
+
+
+def _multisets(text: str) -> str:
+    words = multiset_words(text)
+    missing = sorted(set(letters_of(words)) - set("".join(words)))
+    if missing:
+        message = f"words in which each length occurs; {' and '.join(missing)} does not"
+        raise ValueError(message)
+    return ",".join(words)
+
+
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Bend = Annotated[float, Field(ge=0, le=130)]
+Bends = Annotated[tuple[Bend, Bend], BeforeValidator(_split_commas)]
+Lengths = Annotated[tuple[Positive, ...], BeforeValidator(_lengths), AfterValidator(_distinct)]
+Multisets = Annotated[str, AfterValidator(_multisets)]
 Triple = Annotated[tuple[Positive, Positive, Positive], BeforeValidator(_split_commas)]
 
 
@@ -88,6 +160,18 @@ class KitSpec(BaseModel):
 
     classes: int = _field(7, "Congruence", "Number k of classes of identical pieces.", ge=1)
     method: Method = _field("pressure", "Congruence", "Solver that makes the pieces of a class alike.")
+    palette: Lengths | None = _field(
+        None,
+        "Congruence",
+        "Two or three edge lengths in mm, such as 30,35.1, that the pieces are to have exactly; or universal "
+        f"({', '.join(f'{x:g}' for x in UNIVERSAL)}), one pair for every shape.",
+    )
+    like: Path | None = _field(
+        None, "Congruence", "Kit folder or kit.json whose edge lengths and triangles the pieces are to have."
+    )
+    multisets: Multisets | None = _field(
+        None, "Congruence", "Triangles by their lengths, short and long: ssl,sll; of three lengths: aab,abc,bcc."
+    )
     tolerance_percent: float = _field(
         1.5, "Congruence", "Largest error of a piece that counts as converged, in percent of the mean edge.", gt=0
     )
@@ -133,7 +217,22 @@ class KitSpec(BaseModel):
     swing_degrees: float = _field(
         5.5, "Pieces", "Swing that every joint keeps to either side, so that it can be assembled.", ge=0, le=30
     )
+    bevel_degrees: Bends | None = _field(
+        None,
+        "Pieces",
+        "Concave,convex bends that every side is bevelled for, so that a piece fits any shape; those of this shape "
+        f"when not given, {', '.join(f'{x:g}' for x in UNIVERSAL_BEVEL)} where lengths are.",
+    )
     bed_mm: Triple = _field((220.0, 220.0, 250.0), "Pieces", "Build volume X,Y,Z of the printer.")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _implied(cls, values: object) -> object:
+        """Lengths or triangles from outside imply the palette solver, and the number of classes."""
+        if not isinstance(values, dict):
+            return values
+        given = cast("dict[str, object]", values)
+        return _implied_by_palette(given) | given
 
     @model_validator(mode="after")
     def _consistent(self) -> "KitSpec":
@@ -149,6 +248,9 @@ class KitSpec(BaseModel):
         if self.faces is not None and self.classes > self.faces:
             message = f"classes is {self.classes}, more than the {self.faces} faces"
             raise ValueError(message)
+        contradiction = _contradiction(self)
+        if contradiction:
+            raise ValueError(contradiction)
         return self
 
     @property
@@ -186,6 +288,51 @@ class KitSpec(BaseModel):
                 remedy="more --faces",
             )
         return vertices
+
+
+def _implied_by_palette(given: dict[str, object]) -> dict[str, object]:
+    """Method and classes for what is given of palette, like and multisets; what is wrong is found out afterwards."""
+    palette, like, multisets = (given.get(name) for name in ("palette", "like", "multisets"))
+    if palette is None and multisets is None:
+        return {} if like is None else {"method": "palette"}  # the kit tells the classes once it is read
+    if isinstance(multisets, str):
+        classes = len({"".join(sorted(word.strip().lower())) for word in multisets.split(",") if word.strip()})
+    else:
+        commas = palette.count(",") if isinstance(palette, str) else 0
+        three = commas == 2 or (isinstance(palette, list | tuple) and len(cast("list[object]", palette)) == 3)
+        classes = MOST_CLASSES[3] if three else 2
+    bevel = {"bevel_degrees": UNIVERSAL_BEVEL} if palette is not None and _is_bisected(given) else {}
+    return {"method": "palette", "classes": max(classes, 1), **bevel}
+
+
+def _is_bisected(given: dict[str, object]) -> bool:
+    return given.get("thickening", "bisector") == "bisector"
+
+
+def _contradiction(spec: KitSpec) -> str:
+    """What is wrong between palette, like, multisets, method and classes; empty where nothing is."""
+    given = [name for name in ("palette", "like", "multisets") if getattr(spec, name) is not None]
+    if given and spec.method != "palette":
+        return f"{given[0]} is given and method is {spec.method}: only --method palette makes edges of given lengths"
+    if spec.like is not None and len(given) > 1:
+        other = next(name for name in given if name != "like")
+        return f"like and {other} are both given: the kit that is named has both lengths and triangles"
+    if spec.bevel_degrees is not None and spec.thickening != "bisector":
+        return f"bevel_degrees is given and thickening is {spec.thickening}: only bisector follows bends"
+    return _palette_contradiction(spec)
+
+
+def _palette_contradiction(spec: KitSpec) -> str:
+    size = None if spec.palette is None else len(spec.palette)
+    if spec.multisets is not None:
+        words = multiset_words(spec.multisets)
+        if size not in (None, len(letters_of(words))):
+            return f"multisets {spec.multisets} name {len(letters_of(words))} lengths, palette gives {size}"
+        if len(words) != spec.classes:
+            return f"classes is {spec.classes}, multisets {spec.multisets} are {len(words)}: give one, not both"
+    elif size is not None and spec.classes > MOST_CLASSES[size]:
+        return f"classes is {spec.classes}: {size} lengths make {MOST_CLASSES[size]} kinds of triangles at most"
+    return ""
 
 
 def _reworded(error: ValidationError) -> SpecError:

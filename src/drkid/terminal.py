@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from drkid.inspection import Inspection
-    from drkid.kit import Kit
+    from drkid.kit import Kit, Rigidity
     from drkid.verification import Verification
 
 MOST_ROWS = 30  # of labels or components that a table shows
@@ -97,11 +97,25 @@ def show_kit(kit: "Kit", folder: "Path", seconds: float) -> None:
         "d_H": f"{distance.mean_percent:.2g} % mean, {distance.max_percent:.2g} % max from the input, of its box",
         "size": f"{size} mm, edges {metrics.mean_edge:.1f} mm, {kit.part_set.dimensions.thickness_mm:g} mm thick",
         "grooves": f"{metrics.groove_mean_mm:.2g} mm mean, {metrics.groove_max_mm:.2g} mm max",
+        "rigidity": _rigidity(metrics.rigidity, metrics.mean_edge),
         "solver": f"{outcome.status}: {outcome.message}",
         "time": f"{seconds:.1f} s",
         "kit": str(folder),
     }
     _show_rows(console, rows)
+
+
+def _rigidity(found: "Rigidity | None", mean_edge_mm: float) -> str:
+    """The word, and the figures that bear it out."""
+    if found is None:
+        return "not measured"
+    text = f"{found.firmness}: {found.stiffness_percent:.2g} % of a round shell's stiffness"
+    if found.second_state_percent is not None and found.barrier_percent is not None:
+        text += (
+            f", a second state {found.second_state_percent / 100 * mean_edge_mm:.2g} mm away"
+            f" behind {found.barrier_percent / 100 * mean_edge_mm:.2g} mm of play"
+        )
+    return text
 
 
 def show_verification(found: "Verification") -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import trimesh
 from pydantic import ValidationError
 
+from drkid.congruence.softest_mode import rigidity
 from drkid.errors import KitFolderError
 from drkid.export import KitDocument
 from drkid.export.layout import ASSEMBLED, BOM_CSV, BOM_JSON, KIT_JSON, PIECE_CLASS, SIMPLIFIED, SURFACE
@@ -22,6 +23,7 @@ RELATIVE = 1e-6  # of a recomputed length: PLY and JSON keep full double precisi
 DISTANCE_PERCENT = 0.02  # of the diagonal: what two samplings of a surface may differ by
 PLACEMENT_OF_ERROR = 1.5  # a corner may miss its vertex by so many times the largest class error
 PLACEMENT_MM = 0.02
+SINGULAR_VALUE = 1e-6  # of the rigidity matrix: below it is rounding, a square root of it
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,7 @@ def verify_kit(folder: str | Path) -> Verification:
         *_congruence(assembled, face_class, kit),
         *_distances(surface, simplified, assembled, kit),
         *_angles(assembled, kit),
+        *_rigidity(assembled, kit),
         _counts(face_class, kit),
         _placement(assembled, kit),
         _order(assembled, kit),
@@ -176,6 +179,21 @@ def _angles(mesh: TriMesh, kit: KitDocument) -> list[Check]:
         _agree("dihedral mean, °", stated.mean_degrees, found.mean_degrees, 1e-6),
         _agree("dihedral p95, °", stated.p95_degrees, found.p95_degrees, 1e-6),
         _agree("concave, %", stated.concave_percent, found.concave_percent, 1e-6),
+    ]
+
+
+def _rigidity(mesh: TriMesh, kit: KitDocument) -> list[Check]:
+    """Of a kit that states it. Movements are left out: where symmetry makes modes alike, they are of any one."""
+    stated = kit.metrics.rigidity
+    if stated is None:
+        return []
+    try:
+        found = rigidity(mesh)
+    except np.linalg.LinAlgError as error:
+        return [Check("rigidity", passed=False, detail=str(error))]
+    return [
+        _agree("softest mode", stated.softest, found.softest, SINGULAR_VALUE),
+        _agree("stiffness, %", stated.stiffness_percent, found.stiffness_percent, 100 * SINGULAR_VALUE),
     ]
 
 

@@ -1,3 +1,5 @@
+import sys
+
 import numpy as np
 import pytest
 import trimesh
@@ -5,6 +7,7 @@ import trimesh
 from drkid.congruence import decompose
 from drkid.congruence.decompose import _isosceles
 from drkid.congruence.pressure import PressureSolver
+from drkid.congruence.softest_mode import rigidity
 from drkid.congruence.solver import run
 from drkid.errors import SpecError
 from drkid.intersection import self_intersections
@@ -102,3 +105,16 @@ def test_nearly_isosceles_classes_are_made_isosceles():
     assert found[2] == pytest.approx([1.0004] * 3)
     assert found[3].tolist() == [1.0, 1.1, 1.2]
     assert (np.sort(found, axis=1) == found).all()
+
+
+def test_it_says_how_stiff_the_shell_is(coarse):
+    found = decompose(coarse, QUICK)
+    assert found.rigidity == rigidity(found.mesh)
+
+
+def test_a_shell_whose_rigidity_cannot_be_measured_is_made_all_the_same(coarse, monkeypatch):
+    def degenerate(_mesh):
+        raise np.linalg.LinAlgError("an edge has no length")
+
+    monkeypatch.setattr(sys.modules["drkid.congruence.decompose"], "rigidity", degenerate)
+    assert decompose(coarse, QUICK).rigidity is None

@@ -40,26 +40,15 @@ def test_stiffness_is_the_smoothness_of_the_mesh(frame):
     np.testing.assert_array_equal(frame.stiffness, smoothness(frame.mesh, BETA))
 
 
-def test_hessian_index_names_the_blocks_of_each_edge(frame):
-    size = 3 * len(frame.mesh.vertices)
-    index = frame.hessian_index.reshape(4, -1, 3, 3)
-    for edge, (a, b) in enumerate(frame.mesh.edges):
-        for block, (row, column) in zip(index[:, edge], ((a, a), (b, b), (a, b), (b, a)), strict=True):
-            rows, columns = np.divmod(block, size)
-            assert (rows == 3 * row + np.arange(3)[:, None]).all()
-            assert (columns == 3 * column + np.arange(3)).all()
-
-
 CONNECTIVITY_ONLY = ("edges", "face_edges", "edge_faces", "valence", "half_edges")
 
 
 def test_moved_keeps_what_depends_on_the_connectivity_alone(frame):
     before = {name: getattr(frame.mesh, name) for name in CONNECTIVITY_ONLY}
-    stiffness, index = frame.stiffness, frame.hessian_index
+    stiffness = frame.stiffness
     moved = frame.moved(2 * frame.mesh.vertices, LENGTHS)
     assert all(getattr(moved.mesh, name) is before[name] for name in CONNECTIVITY_ONLY)
     assert moved.stiffness is stiffness
-    assert moved.hessian_index is index
     assert moved.labels is frame.labels
 
 

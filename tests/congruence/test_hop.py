@@ -2,17 +2,19 @@ import numpy as np
 import pytest
 
 from drkid.congruence.hop import (
+    LOCAL,
+    REHEATS,
     Anneal,
     Problem,
     annealed,
     edges_around,
     exactly,
     hop,
-    quadratic_model,
     start,
 )
 from drkid.congruence.palette import palette_of_classes
 from drkid.congruence.palette_solver import first_frame
+from drkid.congruence.quadratic_model import quadratic_model
 from drkid.congruence.target import Target
 from drkid.mesh import TriMesh
 
@@ -73,6 +75,36 @@ def test_a_local_anneal_changes_no_label_elsewhere(problem, soft):
                 assert tuple(edge) in inside or tuple(edge) not in before
                 changed += 1
     assert changed > 0
+
+
+def test_a_cold_anneal_is_made_hotter_until_something_changes(problem, soft):
+    """Nine orders of magnitude too cold: not even the last attempt changes anything; three: one does."""
+
+    def changed(heat: float) -> bool:
+        found = annealed(start_again, problem, Anneal(0.3, 0.05, heat, 3000), np.random.default_rng(0))
+        return bool((found.labels != start_again.labels).any() or (found.mesh.faces != start_again.mesh.faces).any())
+
+    start_again = annealed(soft, problem, Anneal(0.3, 0.05, 1e-9, 60_000), np.random.default_rng(0))
+    assert not changed(1e-9)
+    assert changed(1.7 ** (1 - REHEATS))
+
+
+def test_an_anneal_ends_where_its_model_is_at_rest(problem, soft):
+    """At the vertices that come out the linear model of the lengths and offsets has no force left."""
+    how = Anneal(0.3, 0.05, 0.5, 4000)
+    found = annealed(soft, problem, how, np.random.default_rng(1))
+    model = quadratic_model(found, problem.target, how.weight, how.damping)
+    before = quadratic_model(soft, problem.target, how.weight, how.damping)
+    assert np.linalg.norm(model.shift) < 0.7 * np.linalg.norm(before.shift) + 0.05
+
+
+def test_drawn_anneals_lie_in_their_ranges():
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        how = LOCAL.draw(rng)
+        for value, (low, high) in ((how.weight, LOCAL.weight), (how.heat, LOCAL.heat), (how.damping, LOCAL.damping)):
+            assert low <= value <= high
+        assert LOCAL.steps[0] - 1 <= how.steps <= LOCAL.steps[1]
 
 
 def test_the_model_is_stationary_where_it_says(problem, soft):

@@ -1,3 +1,4 @@
+from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
 import numpy as np
@@ -7,7 +8,8 @@ from quadratic_problem import pebble, small_ring
 
 from drkid.congruence import newton
 from drkid.congruence.framework import Framework
-from drkid.congruence.newton import LONGEST_STEP, _step
+from drkid.congruence.levenberg_marquardt import changed_lengths, palette_columns
+from drkid.congruence.newton import LONGEST_STEP, PALETTE_SHARE, _step
 from drkid.congruence.rigidity import rigidity_matrix
 from drkid.mesh import TriMesh
 
@@ -151,3 +153,31 @@ def test_the_solution_turns_and_scales_with_the_start(freedom):
     turned = start.moved(start.mesh.vertices @ turn + 5, start.lengths)
     found, again = newton.exact(start, freedom), newton.exact(turned, freedom)
     np.testing.assert_allclose(again.mesh.vertices, found.mesh.vertices @ turn + 5, atol=1e-9)
+
+
+@pytest.mark.parametrize("freedom", FREEDOMS)
+@pytest.mark.parametrize("make", [pebble, small_ring])
+def test_a_step_is_that_of_plain_dense_algebra(make, freedom):
+    """(J Jᵀ + s P Pᵀ + ε I) t = residual; the vertices go along −Jᵀ t, the palette's unknowns along s Pᵀ t."""
+    mesh = make()
+    start = shaken(Framework(mesh, np.arange(len(mesh.edges)) % 5, mesh.edge_lengths[:5].copy()), 0.02)
+    jacobian = rigidity_matrix(start.mesh.vertices, start.mesh.edges)
+    columns = palette_columns(start, freedom)
+    normal = jacobian @ jacobian.T + PALETTE_SHARE * columns @ columns.T
+    tension = np.linalg.solve(normal + 1e-9 * np.eye(len(normal)), start.residual)
+    shift = -(jacobian.T @ tension).reshape(-1, 3)
+    share = min(1.0, LONGEST_STEP * start.wanted.mean() / np.abs(shift).max())
+    found = _step(start, freedom)
+    assert start.worst > 1e-3
+    np.testing.assert_allclose(found.mesh.vertices - start.mesh.vertices, share * shift, atol=1e-6)
+    lengths = changed_lengths(start, freedom, share * PALETTE_SHARE * columns.T @ tension)
+    np.testing.assert_allclose(found.lengths, lengths, atol=1e-6)
+
+
+def test_threads_find_the_same():
+    starts = [shaken(own_lengths(pebble()), 0.01, seed) for seed in range(8)]
+    with ThreadPoolExecutor(4) as pool:
+        for start, found in zip(starts, pool.map(newton.exact, starts), strict=True):
+            expected = newton.exact(start)
+            np.testing.assert_array_equal(found.mesh.vertices, expected.mesh.vertices)
+            np.testing.assert_array_equal(found.lengths, expected.lengths)

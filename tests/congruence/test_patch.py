@@ -3,7 +3,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drkid.congruence.block_anneal import Blocks, anneal_by_patches, sparse_exactly, sparse_start
 from drkid.congruence.framework import Framework
 from drkid.congruence.labelling import nearest_labels, repaired
 from drkid.congruence.palette import Palette, palette_of_classes
@@ -13,7 +12,6 @@ from drkid.congruence.sparse_solve import sparse_linearised, sparse_smoothness, 
 from drkid.congruence.target import Target
 
 WEIGHT, DAMPING = 0.4, 0.05
-QUICK = Blocks(steps_per_edge=100, core=25, moving=50, visits=1)
 
 
 @pytest.fixture(scope="module")
@@ -113,32 +111,3 @@ def test_annealing_changes_only_the_core_and_leaves_a_sound_allowed_mesh(frame, 
     assert changed
     assert all(a in core and b in core for a, b, _ in changed)
     assert len(set(map(tuple, found.mesh.edges.tolist())) - set(map(tuple, frame.mesh.edges.tolist()))) > 0
-
-
-def test_annealing_by_patches_lowers_the_merit_whatever_the_number_of_workers(frame, target, palette):
-    merits, found = [], []
-    for workers in (1, 2):
-        one = anneal_by_patches(
-            frame,
-            target,
-            palette,
-            weight=WEIGHT,
-            freedom="scale",
-            rng=np.random.default_rng(5),
-            blocks=QUICK,
-            workers=workers,
-        )
-        merits.append(sparse_linearised(one, target, WEIGHT, sparse_smoothness(one.mesh)).merit)
-        found.append(one)
-    np.testing.assert_array_equal(found[0].labels, found[1].labels)
-    np.testing.assert_allclose(found[0].mesh.vertices, found[1].mesh.vertices, atol=1e-9)
-    assert merits[0] < 0.7 * sparse_linearised(frame, target, WEIGHT, sparse_smoothness(frame.mesh)).merit
-
-
-def test_a_start_and_the_exact_phase_leave_small_errors_and_the_ratio_held_meanwhile(frame, target, palette):
-    soft = sparse_start(frame, target, palette, "all", np.random.default_rng(2), QUICK)
-    assert soft.lengths[1] / soft.lengths[0] == pytest.approx(frame.lengths[1] / frame.lengths[0])
-    solved = sparse_exactly(soft, target, "all")
-    assert solved.worst < 0.03
-    assert solved.worst <= sparse_exactly(soft, target, "all", square=False).worst
-    assert palette.allowed[tuple(solved.labels[solved.mesh.face_edges].T)].all()

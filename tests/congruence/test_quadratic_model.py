@@ -1,19 +1,25 @@
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from quadratic_problem import assert_models_agree, dense_problem, pebble, room
+from plain_linearisation import across, plain_linearised, plain_offsets
+from quadratic_problem import DenseProblem, assert_models_agree, dense_problem, pebble, room, small_ring
 
+from drkid.congruence.framework import Framework
 from drkid.congruence.quadratic_model import (
     compliance,
     connectivity,
     price_of_flip,
     price_of_labels,
     push,
+    quadratic_model,
     stretch,
     take_flip,
     take_label,
 )
+from drkid.congruence.target import Target
 
 LENGTHS = np.array([0.9, 1.0, 1.15])
 SEEDS = st.integers(0, 2**32 - 1)
@@ -32,6 +38,69 @@ def problem(mesh):
 @pytest.fixture(scope="module")
 def labels(mesh):
     return np.random.default_rng(5).integers(3, size=len(mesh.edges))
+
+
+def framework_near(mesh, seed):
+    """A framework off the mesh, whose target is the mesh itself."""
+    rng = np.random.default_rng(seed)
+    vertices = mesh.vertices + 0.1 * rng.normal(size=mesh.vertices.shape)
+    return Framework(mesh.moved(vertices), rng.integers(3, size=len(mesh.edges)), LENGTHS)
+
+
+@pytest.mark.parametrize("make", [pebble, small_ring])
+@pytest.mark.parametrize(("weight", "damping"), [(0.0, 0.3), (0.3, 0.05), (1.0, 0.01)])
+def test_the_model_of_a_framework_is_that_of_plain_dense_algebra(make, weight, damping):
+    frame = framework_near(make(), 3)
+    target = Target(make())
+    offset, normals = plain_offsets(target, frame.mesh.vertices)
+    dense = DenseProblem(frame.mesh.vertices.copy(), offset, across(normals), frame.stiffness, weight, damping)
+    assert_models_agree(quadratic_model(frame, target, weight, damping), dense.model(frame.mesh.edges, frame.wanted))
+
+
+def test_the_model_of_a_framework_is_stationary_at_its_shift(mesh):
+    """H y = −gradient, the residual is what y leaves, and inverse and coupling are symmetric."""
+    frame, target = framework_near(mesh, 4), Target(mesh)
+    plain, model = plain_linearised(frame, target, 0.3), quadratic_model(frame, target, 0.3, 0.05)
+    hessian = plain.hessian + 0.05**2 * np.eye(len(plain.hessian))
+    np.testing.assert_allclose(hessian @ model.shift, -plain.gradient, atol=1e-10)
+    np.testing.assert_allclose(hessian @ model.inverse, np.eye(len(hessian)), atol=1e-9)
+    np.testing.assert_array_equal(model.inverse, model.inverse.T)
+    np.testing.assert_array_equal(model.coupling, model.coupling.T)
+    assert np.linalg.eigvalsh(model.coupling).min() > -1e-12
+    assert np.diag(model.coupling).max() < 1
+    for edge, ends in enumerate(frame.mesh.edges):
+        left = -frame.residual[edge] - stretch(model.shift, ends, model.direction[edge])
+        assert model.residual[edge] == pytest.approx(left, abs=1e-12)
+
+
+def test_a_framework_without_a_model_is_told(mesh):
+    """One with an edge without length, and one that nothing holds in place."""
+    frame, target = framework_near(mesh, 5), Target(mesh)
+    vertices = frame.mesh.vertices.copy()
+    vertices[mesh.edges[11, 0]] = vertices[mesh.edges[11, 1]]
+    with pytest.raises(np.linalg.LinAlgError, match="no length"):
+        quadratic_model(frame.moved(vertices, LENGTHS), target, 0.3, 0.05)
+    row = np.arange(len(vertices))[:, None] * [1.0, 0.0, 0.0]
+    with pytest.raises(np.linalg.LinAlgError):
+        quadratic_model(frame.moved(row, LENGTHS), target, 0.0, 0.0)
+
+
+def test_the_model_shares_no_array_with_the_framework(mesh):
+    frame = framework_near(mesh, 6)
+    model = quadratic_model(frame, Target(mesh), 0.3, 0.05)
+    for name, array in zip(model._fields, model, strict=True):
+        assert array.flags.writeable, name
+        assert array.flags.c_contiguous, name
+    assert not np.shares_memory(model.position, frame.mesh.vertices)
+    assert not np.shares_memory(model.length, frame.mesh.edge_lengths)
+
+
+def test_threads_make_the_same_model(mesh):
+    frames, target = [framework_near(mesh, seed) for seed in range(8)], Target(mesh)
+    with ThreadPoolExecutor(4) as pool:
+        for frame, found in zip(frames, pool.map(lambda f: quadratic_model(f, target, 0.3, 0.05), frames), strict=True):
+            for one, other in zip(found, quadratic_model(frame, target, 0.3, 0.05), strict=True):
+                np.testing.assert_array_equal(one, other)
 
 
 def other_diagonal(mesh, edge):

@@ -31,8 +31,15 @@ def test_a_dent_counts_as_concave(potato):
     assert Yardstick(potato, KitSpec()).quality(potato.moved(dent)).excess_concave_percent > 5
 
 
+def test_the_farthest_place_is_where_a_vertex_was_pulled_out(potato):
+    spike = potato.vertices.copy()
+    spike[7] += 0.8 * potato.mean_edge * potato.vertex_normals[7]
+    quality = Yardstick(potato, KitSpec()).quality(potato.moved(spike))
+    assert quality.farthest == pytest.approx(tuple(spike[7]))
+
+
 def test_weights_choose_what_counts():
-    quality = Quality(1.0, 5.0, 40.0, 8.0, 10.0)
+    quality = Quality(1.0, 5.0, 40.0, 8.0, 10.0, (0.0, 0.0, 0.0))
 
     def score(**weights: float) -> float:
         zero = dict.fromkeys(("weight_mean", "weight_max", "weight_dihedral", "weight_concave"), 0.0)

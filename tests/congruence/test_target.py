@@ -1,10 +1,13 @@
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
+from plain_linearisation import plain_offsets
 
-from drkid.congruence.target import Target, _barycentric, smoothness
+from drkid.congruence.target import Target, signed_offsets, smoothness
 from drkid.mesh import TriMesh
 
 RADIUS = 2.0
@@ -70,15 +73,34 @@ def test_offsets_move_and_scale_with_the_surface(potato, seed, factor):
     np.testing.assert_allclose(turned, normals @ turn, atol=1e-5)
 
 
-@given(st.integers(0, 2**32 - 1))
-def test_barycentric_weights_sum_to_one_and_make_the_point(seed):
-    rng = np.random.default_rng(seed)
-    corners = rng.normal(size=(20, 3, 3))
-    weights = rng.dirichlet(np.ones(3), size=20)
-    found = _barycentric(np.einsum("ij,ijk->ik", weights, corners), corners)
-    np.testing.assert_allclose(found.sum(axis=1), 1, rtol=1e-12)
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    assert (np.abs(found - weights).max(axis=1) < 1e-11 / area**2).all()
+@pytest.mark.parametrize("name", ["potato", "ring"])
+@pytest.mark.parametrize("seed", range(3))
+def test_offsets_and_normals_are_those_of_another_search(name, seed, request):
+    """igl's closest points, and the same normals interpolated with weights from areas."""
+    target, rng = Target(request.getfixturevalue(name)), np.random.default_rng(seed)
+    at = target.mesh.vertices + 0.2 * rng.normal(size=target.mesh.vertices.shape)
+    offset, normals = target.offsets(at)
+    expected, others = plain_offsets(target, at)
+    np.testing.assert_allclose(offset, expected, atol=1e-12)
+    np.testing.assert_allclose(normals, others, atol=1e-10)
+
+
+def test_guesses_of_the_nearest_triangle_do_not_matter(ball):
+    at = points(3)
+    slots = np.random.default_rng(0).integers(len(ball.mesh.faces), size=len(at))
+    offset, normals = signed_offsets(ball.surface, at, slots)
+    expected, others = ball.offsets(at)
+    np.testing.assert_allclose(offset, expected, atol=1e-13)
+    np.testing.assert_allclose(normals, others, atol=1e-12)
+
+
+def test_threads_find_the_same(ball):
+    places = [points(seed) for seed in range(12)]
+    with ThreadPoolExecutor(4) as pool:
+        for at, (offset, normals) in zip(places, pool.map(ball.offsets, places), strict=True):
+            expected, others = ball.offsets(at)
+            np.testing.assert_array_equal(offset, expected)
+            np.testing.assert_array_equal(normals, others)
 
 
 @pytest.mark.parametrize("name", ["potato", "ring"])

@@ -1,5 +1,5 @@
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
@@ -28,6 +28,14 @@ def test_the_document_obeys_its_own_schema_and_states_resolved_parameters(kit, k
     assert document.spec["bed_mm"] == [220, 220, 250]
     assert document.convergence[0].iteration == 0
     assert document.convergence[-1].iteration == kit.decomposition.iterations
+
+
+def test_the_rigidity_is_written_as_measured(kit, kit_folder):
+    found = json.loads((kit_folder / "kit.json").read_text())["metrics"]["rigidity"]
+    measured = asdict(kit.decomposition.rigidity)
+    assert found == {name: value for name, value in measured.items() if value is not None}
+    allowed = KitDocument.model_json_schema()["$defs"]["RigidityDocument"]["properties"]
+    assert set(allowed) == set(measured)
 
 
 def test_an_existing_folder_is_refused_and_left_as_it_is(kit, kit_folder):

@@ -1,10 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from exact_shapes import decomposed, geodesic, potato, sixths
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drkid.parts.bevel import MOST_MIDDLE_INSET, bisector_insets, demanded, limited
+from drkid.parts.bevel import MOST_MIDDLE_INSET, bevel_insets, bisector_insets, demanded, limited
 from drkid.parts.class_triangle import equal_sides
 from drkid.parts.members import members_of
 
@@ -39,6 +41,22 @@ def test_insets_serve_every_member_and_are_shared_by_equal_sides(seed, classes, 
             # no more than needed at either face, unless the side would stand out over the hinge axis
             assert spare[0] == pytest.approx(spare[1], abs=1e-9)
             assert spare[0] < 1e-9 or insets[k][:, group == g].mean() == pytest.approx(0, abs=1e-9)
+
+
+@given(st.integers(0, 20), st.floats(2, 12), st.floats(0, 15))
+def test_a_bevel_for_any_shape_serves_every_joint_within_its_bends(seed, thickness, swing) -> None:
+    members = members_of(decomposed(potato(seed), 60))
+    bends = np.degrees(members.bend_radians)
+    exact = replace(members, far=np.zeros_like(members.far))
+    insets = bevel_insets((max(0.0, -bends.min()), bends.max()), thickness, swing)
+    demand = demanded(exact, 20.0, thickness, swing)
+    assert (insets >= demand - 1e-9).all()
+    assert (insets[0] - demand[:, 0]).min() == pytest.approx(0, abs=1e-9)
+
+
+def test_a_bevel_that_serves_as_much_inwards_as_outwards_is_the_same_on_both_faces() -> None:
+    inner, outer = bevel_insets((40.0, 40.0), 7.0, 5.0).ravel()
+    assert inner == outer == pytest.approx(3.5 * np.tan(np.radians(22.5)))
 
 
 def test_a_class_without_members_gets_no_bevel() -> None:

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from exact_shapes import decomposed, geodesic, icosahedron, potato, sixths, tetrahedron
@@ -149,6 +151,45 @@ def test_a_piece_larger_than_the_bed_is_refused() -> None:
     with pytest.raises(FitError, match="larger than the printer's bed") as caught:
         made(icosahedron(), size_mm=500)
     assert "220" in caught.value.wanted
+
+
+def test_a_scale_that_the_lengths_fix_is_kept_whatever_the_size() -> None:
+    d = replace(decomposed(geodesic()), scale_mm_per_unit=123.456)
+    parts = make_parts(d, KitSpec(size_mm=50))
+    assert parts.scale_mm_per_unit == 123.456
+    assert side_lengths(parts.parts[0].corners) == pytest.approx(d.class_lengths[0] * 123.456, abs=1e-9)
+
+
+def test_lengths_too_short_for_the_connector_are_refused_with_those_that_do() -> None:
+    d = decomposed(geodesic())
+    with pytest.raises(FitError, match="wall between two pockets") as caught:
+        make_parts(replace(d, scale_mm_per_unit=30.0), KitSpec())
+    error = caught.value
+    assert float(error.found.split()[0]) < float(error.wanted.split()[0])
+    longer = min(float(word) for word in error.remedy.split("--palette ")[1].split(")")[0].split(","))
+    fitting = longer / d.class_lengths.min()
+    assert make_parts(replace(d, scale_mm_per_unit=fitting), KitSpec()).scale_mm_per_unit == fitting
+    assert make_parts(replace(d, scale_mm_per_unit=30.0), KitSpec(connector="none")).scale_mm_per_unit == 30
+
+
+def test_a_bevel_for_any_shape_makes_the_same_pieces_whatever_the_joints() -> None:
+    sphere = geodesic()
+    flat = sphere.moved(sphere.vertices * [1, 1, 0.8])
+    bent, flatter = (replace(decomposed(mesh, 1), scale_mm_per_unit=80.0) for mesh in (sphere, flat))
+    flatter = replace(flatter, class_lengths=bent.class_lengths)
+    one, other = (make_parts(d, KitSpec(bevel_degrees=(30, 60))).parts[0].solid for d in (bent, flatter))
+    assert one.volume == pytest.approx(other.volume)
+    assert (one & other).volume == pytest.approx(one.volume)
+    own = make_parts(bent, KitSpec()).parts[0].solid
+    assert own.volume > one.volume * 1.01
+
+
+def test_notes_count_the_joints_beyond_a_bevel_for_any_shape() -> None:
+    notes = " ".join(made(icosahedron(), bevel_degrees=(10, 40)).notes)
+    assert "30 joints bend beyond the 10° concave or 40° convex" in notes
+    assert "to 42° and 42° at most" in notes
+    assert "stops short" not in notes
+    assert "bend beyond" not in " ".join(made(icosahedron(), bevel_degrees=(10, 42)).notes)
 
 
 def test_scale_of_the_source_does_not_matter_at_a_fixed_size() -> None:

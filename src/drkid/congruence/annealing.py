@@ -152,7 +152,7 @@ def _accepts(rng: np.random.Generator, price: float, temperature: float) -> bool
     return price <= 0 or rng.random() < np.exp(-price / temperature)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, _nrt=False)
 def _take_labels(
     net: Connectivity, model: QuadraticModel, labels: Ints, lengths: Floats, move: Move, count: int
 ) -> None:
@@ -212,7 +212,7 @@ def quad_of(
     return (a, b, c, d), (f, g), (bc, ca, ad, db)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, _nrt=False)
 def flip(net: Connectivity, edge: int) -> None:
     """Turn an edge in the quadrilateral of its faces: they become (a, d, c) and (d, b, c)."""
     (a, b, c, d), (f, g), (bc, ca, ad, db) = quad_of(net, edge)
@@ -241,7 +241,7 @@ def _cross(p: Floats, a: int, b: int, c: int) -> tuple[float, float, float]:
     return uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, _nrt=False)
 def flip_is_sound(net: Connectivity, position: Floats, lengths: Floats, corners: tuple[int, int, int, int]) -> bool:
     """Topology and shape allow the flip: valences, no doubled edge, length, angle across it, areas."""
     a, b, c, d = corners
@@ -275,7 +275,7 @@ def _propose_beside(
     return count
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, _nrt=False)
 def _lay(position: Floats, corners: tuple[int, int, int, int], move: Move) -> float:
     """Ends and unit vector of the edge c d into `move`; its length."""
     squared = 0.0
@@ -289,7 +289,7 @@ def _lay(position: Floats, corners: tuple[int, int, int, int], move: Move) -> fl
     return length
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, _nrt=False)
 def _price_with_labels(
     net: Connectivity,
     model: QuadraticModel,
@@ -316,7 +316,7 @@ def _price_with_labels(
     return FlipPrice(price + found.price, found.release, found.load)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, _nrt=False)
 def _labels_fit(
     net: Connectivity,
     labels: Ints,

@@ -4,10 +4,11 @@ import numpy as np
 
 from drkid.congruence.palette_solver import PaletteSolver
 from drkid.congruence.pressure import PressureSolver
+from drkid.congruence.softest_mode import rigidity
 from drkid.congruence.solver import Solution, run
 from drkid.congruence.triangle_space import ascending_lengths
 from drkid.errors import SpecError
-from drkid.kit import Decomposition
+from drkid.kit import Decomposition, Rigidity
 from drkid.mesh import Floats, TriMesh, read_only
 from drkid.progress import Progress, silent
 from drkid.spec import KitSpec
@@ -22,7 +23,8 @@ def decompose(
 
     `spec.method` chooses the solver: the paper's `pressure` (algorithm 1), or the exact `palette`, which stays near
     `surface` (M_i; M_s where None). Classes come out without empty ones, ordered by their edge lengths; two lengths
-    nearer than `ISOSCELES_PERCENT` are made equal, unless the tolerance would break.
+    nearer than `ISOSCELES_PERCENT` are made equal, unless the tolerance would break. Where `spec.palette` gives lengths
+    in mm, `scale_mm_per_unit` of the result makes the edges those, exactly.
 
     Raises:
         SpecError: more classes than faces, or classes that the solver cannot make of this mesh.
@@ -38,10 +40,10 @@ def decompose(
         solution = run(PaletteSolver(spec, mesh if surface is None else surface), mesh, progress)
     else:
         solution = run(PressureSolver(spec), mesh, progress)
-    return _tidied(solution, spec.tolerance_percent)
+    return _tidied(solution, spec)
 
 
-def _tidied(solution: Solution, tolerance_percent: float) -> Decomposition:
+def _tidied(solution: Solution, spec: KitSpec) -> Decomposition:
     best = solution.best
     points = ascending_lengths(best.mesh)
     used, labels = np.unique(best.face_class, return_inverse=True)
@@ -50,7 +52,7 @@ def _tidied(solution: Solution, tolerance_percent: float) -> Decomposition:
     face_class = np.argsort(order)[labels.ravel()].astype(np.int64)
     lengths = _isosceles(exact[order], best.mesh.mean_edge)
     errors = np.linalg.norm(points - lengths[face_class], axis=1)
-    if 100 * errors.max() / best.mesh.mean_edge > tolerance_percent and solution.outcome.status == "converged":
+    if 100 * errors.max() / best.mesh.mean_edge > spec.tolerance_percent and solution.outcome.status == "converged":
         lengths = exact[order]
         errors = np.linalg.norm(points - lengths[face_class], axis=1)
     return Decomposition(
@@ -61,7 +63,23 @@ def _tidied(solution: Solution, tolerance_percent: float) -> Decomposition:
         iterations=solution.iterations,
         convergence=solution.convergence,
         outcome=solution.outcome,
+        scale_mm_per_unit=_scale_mm_per_unit(solution, spec),
+        rigidity=_rigidity(best.mesh),
     )
+
+
+def _rigidity(mesh: TriMesh) -> Rigidity | None:
+    """None where the mesh is degenerate: its other figures stand without."""
+    try:
+        return rigidity(mesh)
+    except np.linalg.LinAlgError:
+        return None
+
+
+def _scale_mm_per_unit(solution: Solution, spec: KitSpec) -> float | None:
+    """The scale at which the solved lengths are those given; their ratios agree, for they were held."""
+    solved = solution.best.palette_lengths
+    return None if spec.palette is None or solved is None else spec.palette[0] / float(solved[0])
 
 
 def _isosceles(lengths: Floats, mean_edge: float) -> Floats:

@@ -39,29 +39,14 @@ class Framework:
         """K (V, V) of this connectivity."""
         return smoothness(self.mesh, BETA)
 
-    @cached_property
-    def hessian_index(self) -> Ints:
-        """(36 E,): places in the flat (3V, 3V) matrix of the four 3 × 3 blocks of each edge."""
-        size = 3 * len(self.mesh.vertices)
-        first, second = 3 * self.mesh.edges[:, 0], 3 * self.mesh.edges[:, 1]
-        three = np.arange(3)
-        rows = [first, second, first, second]
-        columns = [first, second, second, first]
-        blocks = [
-            (row[:, None, None] + three[:, None]) * size + column[:, None, None] + three
-            for row, column in zip(rows, columns, strict=True)
-        ]
-        return np.concatenate([block.ravel() for block in blocks])
-
     def moved(self, vertices: Floats, lengths: Floats) -> "Framework":
         """Other positions and lengths; what depends on the connectivity alone is kept."""
         other = replace(self, mesh=self.mesh.moved(vertices), lengths=lengths)
         for name in ("_edges_and_sides", "edge_faces", "valence", "half_edges"):
             if name in self.mesh.__dict__:
                 other.mesh.__dict__[name] = self.mesh.__dict__[name]
-        for name in ("stiffness", "hessian_index"):
-            if name in self.__dict__:
-                other.__dict__[name] = self.__dict__[name]
+        if "stiffness" in self.__dict__:
+            other.__dict__["stiffness"] = self.stiffness
         return other
 
 

@@ -11,21 +11,18 @@ import numpy as np
 from drkid.congruence import newton
 from drkid.congruence.annealing import Schedule, anneal
 from drkid.congruence.framework import Framework, framework_of
-from drkid.congruence.levenberg_marquardt import Freedom, linearised, solve
+from drkid.congruence.levenberg_marquardt import Freedom, solve
 from drkid.congruence.palette import Palette
-from drkid.congruence.quadratic_model import QuadraticModel, connectivity
-from drkid.congruence.rigidity import edge_vectors, rigidity_matrix
+from drkid.congruence.quadratic_model import connectivity, quadratic_model
 from drkid.congruence.target import Target
 from drkid.mesh import Ints
 
 START_WEIGHTS = (1.0, 0.6, 0.4, 0.25)
 START_DAMPING, START_HEAT, START_STEPS_PER_FACE = 0.05, 3.0, 1200
 EXACT_WEIGHTS, EXACT_ITERATIONS = (0.1, 0.03, 0.01), 6
-HOP_WEIGHT, HOP_DAMPING, HOP_HEAT, HOP_STEPS = (0.1, 0.3), (0.02, 0.1), (0.05, 0.8), 15_000
-HOP_WEIGHT_OF_ONE, HOP_HEAT_OF_ONE = (0.15, 0.6), (2.0, 20.0)  # one class alone: gentler hops end where they began
-HOP_EXACT_WEIGHT, HOP_ITERATIONS = 0.03, 5
+HOP_EXACT_WEIGHT, HOP_ITERATIONS = 0.03, 6
 FLIP_SHARE = 0.3
-LOCAL_VERTICES = 30  # around the vertex of a local hop
+REHEATS, REHEAT = 6, 1.7  # where an anneal ends as it began: so often again, so much hotter each time
 
 
 @dataclass(frozen=True)
@@ -49,42 +46,50 @@ class Anneal:
     steps: int
 
 
-def quadratic_model(frame: Framework, target: Target, weight: float, damping: float) -> QuadraticModel:
-    """The model of `quadratic_model` at a framework."""
-    at = linearised(frame, target, weight)
-    hessian = at.hessian
-    hessian[np.diag_indices_from(hessian)] += damping**2
-    inverse = np.linalg.inv(hessian)
-    inverse = (inverse + inverse.T) / 2
-    jacobian = rigidity_matrix(frame.mesh.vertices, frame.mesh.edges)
-    direction, length = edge_vectors(frame.mesh.vertices, frame.mesh.edges)
-    shift = -inverse @ at.gradient
-    coupling = jacobian @ inverse @ jacobian.T
-    return QuadraticModel(
-        inverse,
-        np.ascontiguousarray((coupling + coupling.T) / 2),
-        shift,
-        frame.wanted - length - jacobian @ shift,
-        direction,
-        length,
-        frame.mesh.vertices.copy(),
-    )
+@dataclass(frozen=True)
+class Ranges:
+    """Between what a hop's anneal is drawn, evenly in the logarithm; see `Anneal`."""
+
+    weight: tuple[float, float]
+    heat: tuple[float, float]
+    steps: tuple[float, float]
+    damping: tuple[float, float] = (0.02, 0.1)
+
+    def draw(self, rng: np.random.Generator) -> Anneal:
+        """One anneal."""
+        weight, damping, heat, steps = (
+            float(np.exp(rng.uniform(*np.log(r)))) for r in (self.weight, self.damping, self.heat, self.steps)
+        )
+        return Anneal(weight, damping, heat, int(steps))
+
+
+GLOBAL = Ranges((0.05, 0.2), (0.02, 0.4), (3_000, 15_000))
+LOCAL = Ranges((0.05, 0.4), (0.05, 1.6), (3_000, 12_000))
+OF_ONE = Ranges((0.15, 0.6), (2.0, 20.0), (15_000, 15_000))  # one class alone: gentler hops end where they began
 
 
 def annealed(
     frame: Framework, problem: Problem, how: Anneal, rng: np.random.Generator, active: Ints | None = None
 ) -> Framework:
-    """Labels and flips annealed in the quadratic model; positions stay. Only `active` edges change, or all."""
+    """Labels and flips annealed in the quadratic model; only `active` edges change, or all.
+
+    The vertices are those that the model takes for the best. Where nothing has changed it tries again, hotter.
+    """
     model, net = quadratic_model(frame, problem.target, how.weight, how.damping), connectivity(frame.mesh)
     labels = frame.labels.copy()
     free = np.ones(len(labels), np.bool_)
     if active is not None:
         free[:] = False
         free[active] = True
-    spread = float((1 - np.diag(model.coupling)).mean() * (frame.lengths[-1] - frame.lengths[0]) ** 2)
-    schedule = Schedule(how.heat * spread, how.steps, FLIP_SHARE, np.flatnonzero(free), free)
-    anneal(net, model, labels, frame.lengths, problem.palette.allowed.copy(), rng, schedule)
-    return framework_of(frame.mesh.vertices, net.faces, net.edges, labels, frame.lengths)
+    heat = how.heat * float((1 - np.diag(model.coupling)).mean() * (frame.lengths[-1] - frame.lengths[0]) ** 2)
+    for _ in range(REHEATS):
+        schedule = Schedule(heat, how.steps, FLIP_SHARE, np.flatnonzero(free), free)
+        anneal(net, model, labels, frame.lengths, problem.palette.allowed.copy(), rng, schedule)
+        if (labels != frame.labels).any() or (net.faces != frame.mesh.faces).any():
+            break
+        heat *= REHEAT
+    vertices = frame.mesh.vertices + model.shift.reshape(-1, 3)
+    return framework_of(vertices, net.faces, net.edges, labels, frame.lengths)
 
 
 def start(frame: Framework, problem: Problem, rng: np.random.Generator) -> Framework:
@@ -104,19 +109,18 @@ def exactly(frame: Framework, problem: Problem, weights: tuple[float, ...] = EXA
     return newton.exact(frame, problem.freedom) if problem.square else frame
 
 
-def hop(frame: Framework, problem: Problem, rng: np.random.Generator, active: Ints | None = None) -> Framework:
+def hop(
+    frame: Framework, problem: Problem, rng: np.random.Generator, active: Ints | None = None, ranges: Ranges = GLOBAL
+) -> Framework:
     """Soften, anneal gently, solve again. `worst` of the result tells whether it is exact."""
-    one = len(problem.palette.multisets) == 1
-    ranges = (HOP_WEIGHT_OF_ONE, HOP_DAMPING, HOP_HEAT_OF_ONE) if one else (HOP_WEIGHT, HOP_DAMPING, HOP_HEAT)
-    weight, damping, heat = (float(np.exp(rng.uniform(*np.log(r)))) for r in ranges)
-    soft, _ = solve(frame, problem.target, weight, problem.freedom, 4)
-    soft = annealed(soft, problem, Anneal(weight, damping, heat, HOP_STEPS), rng, active)
-    soft, _ = solve(soft, problem.target, weight, problem.freedom, 4)
+    how = ranges.draw(rng)
+    soft, _ = solve(frame, problem.target, how.weight, problem.freedom, 4)
+    soft = annealed(soft, problem, how, rng, active)
     soft, _ = solve(soft, problem.target, HOP_EXACT_WEIGHT, problem.freedom, HOP_ITERATIONS)
     return newton.exact(soft, problem.freedom) if problem.square else soft
 
 
-def edges_around(frame: Framework, centre: int, count: int = LOCAL_VERTICES) -> Ints:
+def edges_around(frame: Framework, centre: int, count: int) -> Ints:
     """Edges among the `count` vertices nearest to a vertex along edges, breadth first."""
     neighbours: list[list[int]] = [[] for _ in range(len(frame.mesh.vertices))]
     for a, b in frame.mesh.edges.tolist():

@@ -4,14 +4,14 @@ Minimises |len(x) − L[labels]|² + w² oᵀ K o over the vertices x and, as fa
 which enter by a small Schur complement (Nocedal and Wright 2006, section 10.3).
 """
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from numba import njit
 
+from drkid.congruence.cholesky import cholesky_solve
 from drkid.congruence.framework import Framework
-from drkid.congruence.rigidity import edge_vectors
+from drkid.congruence.linearisation import Slope, Springs, Trial, add_transposed, slope_at, tried_at
 from drkid.congruence.target import Target
 from drkid.mesh import Floats
 
@@ -23,22 +23,16 @@ LEAST_GAIN = 1e-3  # of the merit in one iteration, below which it ends
 TRIALS = 5  # of larger damping, until the merit falls
 
 
-@dataclass(frozen=True, eq=False)
-class Linearisation:
-    """The merit at a framework, half its gradient by the vertices (3V,), and what it was made of."""
-
-    merit: float
-    gradient: Floats
-    hessian: Floats
-    direction: Floats
-    offset: Floats
+def palette_basis(lengths: Floats, freedom: Freedom) -> Floats:
+    """(p, q): derivative of the palette's lengths by each of their p free unknowns."""
+    if freedom == "all":
+        return np.eye(len(lengths))
+    return lengths[None].copy() if freedom == "scale" else np.zeros((0, len(lengths)))
 
 
 def palette_columns(frame: Framework, freedom: Freedom) -> Floats:
     """(E, p): derivative of the wanted lengths by the palette's p free unknowns."""
-    if freedom == "all":
-        return np.eye(len(frame.lengths))[frame.labels]
-    return frame.wanted[:, None] if freedom == "scale" else np.zeros((len(frame.labels), 0))
+    return palette_basis(frame.lengths, freedom).T[frame.labels]
 
 
 def changed_lengths(frame: Framework, freedom: Freedom, step: Floats) -> Floats:
@@ -48,48 +42,83 @@ def changed_lengths(frame: Framework, freedom: Freedom, step: Floats) -> Floats:
     return frame.lengths * (1 + step[0]) if freedom == "scale" else frame.lengths
 
 
-def transposed(direction: Floats, frame: Framework, values: Floats) -> Floats:
-    """Jᵀ v (3V,) or (3V, p) for v (E,) or (E, p), without making J."""
-    columns = values.reshape(len(values), -1)
-    out = np.zeros((len(frame.mesh.vertices), 3, columns.shape[1]))
-    force = direction[:, :, None] * columns[:, None, :]
-    np.add.at(out, frame.mesh.edges[:, 1], force)
-    np.subtract.at(out, frame.mesh.edges[:, 0], force)
-    return out.reshape(3 * len(out), *values.shape[1:])
+@njit(cache=True, nogil=True)
+def _schur_step(known: Floats, columns: Floats, coupling: Floats, both: Floats, residual: Floats) -> Floats:
+    """(p,): the step of the palette's unknowns; `known` is the gradient, `both` holds the solutions for both."""
+    count = len(columns)
+    schur, right = np.empty((count, count)), np.empty(count)
+    for p in range(count):
+        right[p] = np.dot(columns[p], residual) + np.dot(both[p], known)
+        for q in range(count):
+            schur[p, q] = np.dot(columns[p], columns[q]) - np.dot(coupling[p], both[q])
+        schur[p, p] += 1e-9
+    cholesky_solve(schur, right.reshape(1, -1))
+    return right
 
 
-def length_hessian(frame: Framework, direction: Floats) -> Floats:
-    """JᵀJ (3V, 3V)."""
-    size = 3 * len(frame.mesh.vertices)
-    block = (direction[:, :, None] * direction[:, None, :]).ravel()
-    weights = np.concatenate([block, block, -block, -block])
-    return np.bincount(frame.hessian_index, weights, size * size).reshape(size, size).astype(np.float64, copy=False)
+@njit(cache=True, nogil=True)
+def _damped_step(at: Trial, slope: Slope, springs: Springs, damping: float) -> tuple[Floats, Floats]:
+    """Vertices and lengths after one step."""
+    hessian, size, count = slope.hessian.copy(), len(slope.gradient), len(springs.basis)
+    columns, coupling = np.empty((count, len(springs.labels))), np.zeros((count + 1, size))
+    for p in range(count):
+        for e in range(len(springs.labels)):
+            columns[p, e] = springs.basis[p, springs.labels[e]]
+        add_transposed(slope.direction, springs.edges, columns[p], -1.0, coupling[p])
+    for i in range(size):
+        hessian[i, i] += damping
+        coupling[count, i] = slope.gradient[i]
+    both = coupling.copy()
+    cholesky_solve(hessian, both)
+    vertices, lengths = at.vertices.copy(), at.lengths.copy()
+    step = _schur_step(slope.gradient, columns, coupling, both, at.residual)
+    for i in range(size):
+        vertices[i // 3, i % 3] -= both[count, i]
+        for p in range(count):
+            vertices[i // 3, i % 3] -= step[p] * both[p, i]
+    for p in range(count):
+        for q in range(len(lengths)):
+            lengths[q] += step[p] * springs.basis[p, q]
+    return vertices, lengths
 
 
-def offset_hessian(frame: Framework, normals: Floats) -> Floats:
-    """NᵀKN (3V, 3V)."""
-    outer = normals.reshape(-1, 1) * normals.reshape(1, -1)
-    return outer * np.repeat(np.repeat(frame.stiffness, 3, axis=0), 3, axis=1)
+@njit(cache=True, nogil=True)
+def _damped_least_squares(
+    vertices: Floats, lengths: Floats, springs: Springs, iterations: int
+) -> tuple[Floats, Floats, float]:
+    """Vertices, lengths and merit after at most so many iterations of Levenberg–Marquardt; the merit never rises.
+
+    Raises:
+        numpy.linalg.LinAlgError: the mesh is degenerate beyond what damping mends.
+    """
+    slots = np.zeros(len(vertices), np.int64)
+    at, damping = tried_at(vertices, lengths, springs, slots), FIRST_DAMPING
+    for _ in range(iterations):
+        slope, fallen, tried = slope_at(at, springs), False, at
+        for _trial in range(TRIALS):
+            moved, free = _damped_step(at, slope, springs, damping)
+            tried = tried_at(moved, free, springs, slots)
+            fallen = tried.merit < at.merit
+            if fallen:
+                break
+            damping = max(30 * damping, 1e-4)
+        if not fallen:
+            break
+        gain, at, damping = at.merit - tried.merit, tried, 0.2 * damping
+        if gain < LEAST_GAIN * at.merit:
+            break
+    return at.vertices, at.lengths, at.merit
 
 
-def merit(frame: Framework, offset: Floats, weight: float) -> float:
-    """|len(x) − L[labels]|² + w² oᵀ K o."""
-    return float(frame.residual @ frame.residual + weight**2 * offset @ frame.stiffness @ offset)
-
-
-def linearised(
-    frame: Framework, target: Target, weight: float, offsets: tuple[Floats, Floats] | None = None
-) -> Linearisation:
-    """Merit, half its gradient and Gauss–Newton Hessian by the vertices; `offsets` where they are known already."""
-    direction, _ = edge_vectors(frame.mesh.vertices, frame.mesh.edges)
-    offset, normals = target.offsets(frame.mesh.vertices) if offsets is None else offsets
-    pull = (weight**2 * normals * (frame.stiffness @ offset)[:, None]).ravel()
-    return Linearisation(
-        merit(frame, offset, weight),
-        transposed(direction, frame, frame.residual) + pull,
-        length_hessian(frame, direction) + weight**2 * offset_hessian(frame, normals),
-        direction,
-        offset,
+def springs_of(frame: Framework, target: Target, weight: float, freedom: Freedom) -> Springs:
+    """What the kernels need of a framework, in arrays of their own: read-only ones would be compiled for again."""
+    return Springs(
+        np.array(frame.mesh.edges),
+        np.array(frame.labels),
+        np.array(frame.stiffness),
+        target.surface,
+        float(weight),
+        palette_basis(frame.lengths, freedom),
     )
 
 
@@ -101,33 +130,8 @@ def solve(
     Raises:
         numpy.linalg.LinAlgError: the mesh is degenerate beyond what damping mends.
     """
-    at, damping = linearised(frame, target, weight), FIRST_DAMPING
-    for _ in range(iterations):
-        for _ in range(TRIALS):
-            tried = _step(frame, at, freedom, damping)
-            offsets = target.offsets(tried.mesh.vertices)
-            value = merit(tried, offsets[0], weight)
-            if value < at.merit:
-                break
-            damping = max(30 * damping, 1e-4)
-        else:
-            break
-        gain, frame = at.merit - value, tried
-        if gain < LEAST_GAIN * value:
-            return frame, value
-        at, damping = linearised(frame, target, weight, offsets), 0.2 * damping
-    return frame, at.merit
-
-
-def _step(frame: Framework, at: Linearisation, freedom: Freedom, damping: float) -> Framework:
-    hessian = at.hessian.copy()
-    hessian[np.diag_indices_from(hessian)] += damping
-    factor = cho_factor(hessian, lower=True, overwrite_a=True, check_finite=False)
-    columns = palette_columns(frame, freedom)
-    coupling = -transposed(at.direction, frame, columns)
-    both = cho_solve(factor, np.column_stack([coupling, at.gradient]), check_finite=False)
-    schur = columns.T @ columns - coupling.T @ both[:, :-1]
-    schur[np.diag_indices_from(schur)] += 1e-9
-    step = np.asarray(np.linalg.solve(schur, columns.T @ frame.residual + coupling.T @ both[:, -1]), np.float64)
-    shift = -both[:, -1] - both[:, :-1] @ step
-    return frame.moved(frame.mesh.vertices + shift.reshape(-1, 3), changed_lengths(frame, freedom, step))
+    springs = springs_of(frame, target, weight, freedom)
+    vertices, lengths, value = _damped_least_squares(
+        np.array(frame.mesh.vertices), frame.lengths.copy(), springs, iterations
+    )
+    return frame.moved(vertices, lengths), value

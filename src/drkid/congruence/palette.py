@@ -12,6 +12,7 @@ import numpy as np
 
 from drkid.errors import SpecError
 from drkid.mesh import Bools, Floats, Ints
+from drkid.spec import MULTISETS, letters_of, multiset_words
 
 Multiset = tuple[int, int, int]
 LETTERS = {1: "s", 2: "sl", 3: "abc"}
@@ -26,10 +27,14 @@ FIXED_CLASSES = (1, 2, 3, 4, MOST_CLASSES)  # the others need a mesh to choose f
 
 @dataclass(frozen=True)
 class Palette:
-    """`ratios` of the lengths to the shortest, ascending; `multisets` are the triangles allowed."""
+    """`ratios` of the lengths to the shortest, ascending; `multisets` are the triangles allowed.
+
+    `held` ratios are given from outside: only the common scale of the lengths may then change.
+    """
 
     ratios: tuple[float, ...]
     multisets: tuple[Multiset, ...]
+    held: bool = False
 
     @property
     def size(self) -> int:
@@ -68,16 +73,14 @@ def parse_multisets(text: str) -> Palette:
     Raises:
         SpecError: a word is not three letters of s, l or of a, b, c.
     """
-    words = [word.strip().lower() for word in text.split(",") if word.strip()]
-    letters = "sl" if set("".join(words)) <= set("sl") else "abc"
-    if not words or any(len(word) != 3 or not set(word) <= set(letters) for word in words):
+    try:
+        words = multiset_words(text)
+    except ValueError as error:
         raise SpecError(
-            f"multisets {text!r} cannot be read",
-            wanted="words of three letters, all of s and l or all of a, b and c, separated by commas",
-            found=text,
-            remedy="--multisets ssl,sll",
-        )
-    multisets = sorted({tuple(sorted(letters.index(c) for c in word)) for word in words})
+            f"multisets {text!r} cannot be read", wanted=str(error), found=text, remedy="--multisets ssl,sll"
+        ) from error
+    letters = letters_of(words)
+    multisets = [tuple(letters.index(c) for c in word) for word in words]
     ratios = ONE_CLASS_RATIOS if letters == "sl" and len(multisets) == 1 else RATIOS[len(letters)]
     return Palette(ratios, tuple((a, b, c) for a, b, c in multisets))
 
@@ -93,9 +96,8 @@ def palette_of_classes(classes: int) -> Palette:
     Raises:
         SpecError: no palette of at most three lengths has so many classes.
     """
-    words = {1: "ssl", 2: "ssl,sll", 3: "sss,ssl,sll", 4: "sss,ssl,sll,lll"}
-    if classes in words:
-        return parse_multisets(words[classes])
+    if classes in MULTISETS:
+        return parse_multisets(MULTISETS[classes])
     if classes == MOST_CLASSES:
         return Palette(RATIOS[3], all_multisets(3))
     raise SpecError(

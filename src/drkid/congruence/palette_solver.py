@@ -1,8 +1,8 @@
 """The palette solver: few edge lengths, labelled, annealed and solved until every edge has its length exactly.
 
-Works in units of M_s's mean edge. First a few starts, of which the best is kept, then rounds of hops from the best mesh
-so far. The work of a round depends on the seed and its number alone, so that the same rounds make the same kit on any
-machine; the clock only decides how many there are.
+Works in units of M_s's mean edge. First a few starts; from the best of them walks set out, which now and then gather at
+the best mesh so far. While none is exact they repair folds between hops. What a round does depends on the seed and its
+number alone, so that the same rounds make the same kit anywhere; the clock only decides how many there are.
 """
 
 import os
@@ -16,46 +16,42 @@ from typing import TypeVar
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from drkid.congruence.basin_hopping import HEAT, Found, hopped, judged, stays_or_goes
 from drkid.congruence.block_anneal import sparse_exactly, sparse_start
+from drkid.congruence.fold import repair
 from drkid.congruence.framework import Framework
-from drkid.congruence.hop import Problem, edges_around, exactly, hop, start
+from drkid.congruence.given_palette import palette_of
+from drkid.congruence.hop import Problem, exactly, start
 from drkid.congruence.labelling import first_labels
-from drkid.congruence.palette import Palette, palette_of_classes
-from drkid.congruence.palette_subset import palette_for
-from drkid.congruence.score import Quality, Yardstick
+from drkid.congruence.levenberg_marquardt import Freedom
+from drkid.congruence.palette import Palette
+from drkid.congruence.score import Yardstick
 from drkid.congruence.solver import Candidate
 from drkid.congruence.target import Target
 from drkid.congruence.triangle_space import ascending_lengths, clustering_error
-from drkid.intersection import self_intersections
 from drkid.kit import Convergence, Outcome
-from drkid.mesh import Ints, TriMesh, read_only
+from drkid.mesh import TriMesh, read_only
 from drkid.spec import KitSpec
 
-EXACT = 1e-9  # largest edge error, of the mean edge, that counts as exact
 START_RATIOS = (1.17, 1.15, 1.19)  # of two lengths, tried in turn
-STARTS, TASKS_PER_ROUND = 6, 4
+STARTS, WALKS = 6, 4
+ROUNDS_PER_GATHERING = 30  # of the walks at the best mesh so far; until then they grow colder
 MOST_DENSE_FACES = 800  # beyond, the dense model takes too long: patches and sparse solves, and no hops
-LEAST_RATIO = 1.03  # between neighbouring lengths of the palette: nearer ones are one length to a hand
-UNIT_ERROR = 100.0  # a mesh that is not exact is the better, the smaller its largest error
-WANDER = 0.7  # chance to go on from a hop that was not exact, while nothing is
 SECONDS_PER_FACE = 0.06
-LOCAL_SHARE = 0.3  # of the hops
+MOST_TRIALS = 120  # of a fold's repair in one round
 R = TypeVar("R")
 
 
-@dataclass(frozen=True, eq=False)
-class Found:
-    """A framework with its score; `exact` ones come before others, whatever their scores."""
+@dataclass
+class Trials:
+    """Counts what a repair asks before each trial: the work of a round is then the same on any machine."""
 
-    frame: Framework
-    exact: bool
-    score: float
-    quality: Quality
+    count: int = 0
 
-    @property
-    def rank(self) -> tuple[bool, float]:
-        """For comparison, less being better."""
-        return not self.exact, self.score
+    def __call__(self) -> bool:
+        """Whether the trials of this round are used up."""
+        self.count += 1
+        return self.count > MOST_TRIALS
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +62,7 @@ class PaletteState:
     problem: Problem
     yardstick: Yardstick
     found: Found
-    standing: tuple[Framework, ...]
+    walks: tuple[Found, ...]
     round: int
     began: float
     history: tuple[Convergence, ...]
@@ -93,7 +89,7 @@ class PaletteState:
         face_class = self.problem.palette.class_of(frame.labels[frame.mesh.face_edges])
         lengths = np.array([[frame.lengths[i] for i in m] for m in self.problem.palette.multisets]) * self.scale
         error = clustering_error(ascending_lengths(mesh), face_class, lengths).maximum
-        return Candidate(mesh, read_only(face_class), read_only(lengths), error)
+        return Candidate(mesh, read_only(face_class), read_only(lengths), error, frame.lengths * self.scale)
 
 
 @dataclass(frozen=True)
@@ -113,59 +109,49 @@ class PaletteSolver:
         unit = mesh.scaled(1 / scale)
         large = len(mesh.faces) > MOST_DENSE_FACES
         with threadpool_limits(1):
-            palette = self._palette(unit, large)
+            palette = palette_of(self.spec, unit, np.random.default_rng([self.spec.seed, 0, STARTS]), large=large)
+        free: Freedom = "scale" if palette.held else "all"
         problem = Problem(
             Target(self.surface.scaled(1 / scale)),
             palette,
-            "all" if mesh.genus == 0 else "none",
+            free if mesh.genus == 0 else "none",
             mesh.genus == 0,
         )
         yardstick = Yardstick(unit, self.spec)
 
-        def begin(number: int) -> tuple[Framework, Found]:
+        def begin(number: int) -> Found:
             rng = np.random.default_rng([self.spec.seed, 0, number])
             first = first_frame(unit, problem.palette, number, rng)
             if large:
                 return _large_start(first, problem, yardstick, rng)
-            soft = start(first, problem, rng)
-            return soft, _judged(exactly(soft, problem), yardstick)
+            return judged(exactly(start(first, problem, rng), problem), yardstick)
 
         with threadpool_limits(1):
             results = _in_parallel([lambda n=n: begin(n) for n in range(1 if large else STARTS)])
-        softs = sorted(results, key=_rank_of_start)
-        best = softs[0][1]
-        state = PaletteState(
-            scale, problem, yardstick, best, tuple(soft for soft, _ in softs[:TASKS_PER_ROUND]), 0, began, ()
-        )
+        walks = sorted(results, key=_rank)[:WALKS]
+        walks += walks[: WALKS - len(walks)]
+        state = PaletteState(scale, problem, yardstick, walks[0], tuple(walks), 0, began, ())
         return replace(state, history=(_recorded(state),))
 
-    def _palette(self, unit: TriMesh, large: bool) -> Palette:
-        if large:
-            return palette_of_classes(self.spec.classes)
-        return palette_for(unit, self.spec.classes, np.random.default_rng([self.spec.seed, 0, STARTS]))
-
     def step(self, state: PaletteState) -> PaletteState:
-        """One round: hops from the best exact mesh, or from where each search stands while none is exact."""
-        standing = (state.found.frame,) * TASKS_PER_ROUND if state.found.exact else state.standing
+        """One round: a hop, or the repair of a fold, in each walk; the walks gather at the best mesh now and then."""
+        phase = state.round % ROUNDS_PER_GATHERING
+        gathers = phase == 0 and state.round > 0 and state.found.exact
+        walks = (state.found,) * WALKS if gathers else state.walks
 
-        def leap(number: int) -> Found:
+        def walk(number: int) -> tuple[Found, Found | None]:
             rng = np.random.default_rng([self.spec.seed, state.round + 1, number])
-            frame = standing[number % len(standing)]
-            active = _somewhere(frame, rng) if rng.random() < LOCAL_SHARE else None
-            try:
-                return _judged(hop(frame, state.problem, rng, active), state.yardstick)
-            except np.linalg.LinAlgError:  # this hop broke the mesh: it is not taken
-                return replace(state.found, frame=frame, exact=False, score=np.inf)
+            old = walks[number]
+            if not state.found.exact and (number + state.round) % 2 == 0:
+                new = _repaired(old, state, rng)
+            else:
+                new = hopped(old, state.problem, state.yardstick, rng)
+            return stays_or_goes(old, new, HEAT * (1 - phase / ROUNDS_PER_GATHERING), rng), new
 
         with threadpool_limits(1):
-            results = _in_parallel([lambda n=n: leap(n) for n in range(TASKS_PER_ROUND)])
-        best = min([state.found, *results], key=_rank)
-        rng = np.random.default_rng([self.spec.seed, state.round + 1, TASKS_PER_ROUND])
-        wandered = tuple(
-            found.frame if np.isfinite(found.score) and rng.random() < WANDER else old
-            for old, found in zip(standing, results, strict=False)
-        )
-        state = replace(state, found=best, standing=wandered, round=state.round + 1)
+            results = _in_parallel([lambda n=n: walk(n) for n in range(WALKS)])
+        best = min([state.found, *(new for _, new in results if new is not None)], key=_rank)
+        state = replace(state, found=best, walks=tuple(stays for stays, _ in results), round=state.round + 1)
         return replace(state, history=(_recorded(state),))
 
     def finished(self, state: PaletteState) -> Outcome | None:
@@ -210,42 +196,32 @@ def first_frame(mesh: TriMesh, palette: Palette, number: int, rng: np.random.Gen
     Raises:
         SpecError: no labelling of this mesh has only allowed triangles.
     """
-    if palette.size == 2 and len(palette.multisets) > 1:
+    if palette.size == 2 and len(palette.multisets) > 1 and not palette.held:
         palette = replace(palette, ratios=(1.0, START_RATIOS[number % len(START_RATIOS)]))
     ratios = np.array(palette.ratios)
     labels = first_labels(mesh, palette, ratios * float(mesh.mean_edge / ratios.mean()), rng)
     return Framework(mesh, labels, palette.lengths(mesh.mean_edge, labels))
 
 
-def _large_start(
-    first: Framework, problem: Problem, yardstick: Yardstick, rng: np.random.Generator
-) -> tuple[Framework, Found]:
+def _large_start(first: Framework, problem: Problem, yardstick: Yardstick, rng: np.random.Generator) -> Found:
     """A mesh too large for the dense model: annealed by patches, solved sparsely."""
     workers = os.cpu_count() or 1
     soft = sparse_start(first, problem.target, problem.palette, problem.freedom, rng, workers=workers)
-    return soft, _judged(sparse_exactly(soft, problem.target, problem.freedom, square=problem.square), yardstick)
+    return judged(sparse_exactly(soft, problem.target, problem.freedom, square=problem.square), yardstick)
+
+
+def _repaired(found: Found, state: PaletteState, rng: np.random.Generator) -> Found | None:
+    """One walk's mesh with some of its folds repaired; None where that broke it."""
+    problem = state.problem
+    try:
+        frame = repair(found.frame, problem.target, problem.palette, rng, Trials(), problem.freedom)
+    except np.linalg.LinAlgError:
+        return None
+    return judged(frame, state.yardstick)
 
 
 def _rank(found: Found) -> tuple[bool, float]:
     return found.rank
-
-
-def _rank_of_start(pair: tuple[Framework, Found]) -> tuple[bool, float]:
-    return pair[1].rank
-
-
-def _judged(frame: Framework, yardstick: Yardstick) -> Found:
-    apart = bool((frame.lengths[1:] > LEAST_RATIO * frame.lengths[:-1]).all())
-    exact = frame.worst < EXACT and apart and len(self_intersections(frame.mesh)) == 0
-    quality = yardstick.quality(frame.mesh)
-    score = yardstick.score(quality)
-    return Found(frame, exact, score if exact else score + UNIT_ERROR * frame.worst, quality)
-
-
-def _somewhere(frame: Framework, rng: np.random.Generator) -> Ints:
-    """Edges around a vertex, drawn by how much is amiss there."""
-    amiss = np.bincount(frame.mesh.edges.ravel(), np.repeat(frame.residual**2, 2), len(frame.mesh.vertices)) + 1e-12
-    return edges_around(frame, int(rng.choice(len(amiss), p=amiss / amiss.sum())))
 
 
 def _recorded(state: PaletteState) -> Convergence:

@@ -71,10 +71,7 @@ def ball(around: list[list[int]], centre: int, count: int, closed: set[int]) -> 
 def packing(mesh: TriMesh, core: int, moving: int, visits: Ints, rng: np.random.Generator) -> list[Patch]:
     """Disjoint patches around the least visited vertices (V,) first, as many as find room for a whole core."""
     around, taken, patches = neighbours(mesh), set[int](), list[Patch]()
-    least = visits.min()
     for centre in np.argsort(visits + rng.random(len(visits)), kind="stable").tolist():
-        if visits[centre] > least and patches:
-            break
         if centre in taken:
             continue
         inside = ball(around, centre, moving, taken)

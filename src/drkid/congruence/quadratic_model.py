@@ -16,6 +16,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from drkid.congruence.framework import Framework
+from drkid.congruence.levenberg_marquardt import springs_of
+from drkid.congruence.linearisation import Springs, slope_at, tried_at
+from drkid.congruence.target import Target
 from drkid.mesh import Bools, Floats, Ints, TriMesh
 
 
@@ -64,6 +68,57 @@ def connectivity(mesh: TriMesh) -> Connectivity:
     )
 
 
+@njit(cache=True, _nrt=False)
+def _fill_coupling(inverse: Floats, edges: Ints, direction: Floats, half: Floats, out: Floats) -> None:
+    """J H⁻¹ Jᵀ into `out` (E, E), by way of `half`, J H⁻¹ (E, 3V)."""
+    for e in range(len(edges)):
+        for r in range(3):
+            head, tail = inverse[3 * edges[e, 1] + r], inverse[3 * edges[e, 0] + r]
+            for i in range(len(inverse)):
+                half[e, i] += direction[e, r] * (head[i] - tail[i])
+        for f in range(e + 1):
+            total = 0.0
+            for r in range(3):
+                total += direction[f, r] * (half[e, 3 * edges[f, 1] + r] - half[e, 3 * edges[f, 0] + r])
+            out[e, f] = out[f, e] = total
+
+
+@njit(cache=True, nogil=True)
+def _inverse_and_coupling(
+    vertices: Floats, lengths: Floats, springs: Springs, damping: float
+) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """H⁻¹ (3V, 3V), J H⁻¹ Jᵀ (E, E), the minimiser y (3V,), −J y (E,) and the edges' unit vectors; `damping` is μ².
+
+    Raises:
+        numpy.linalg.LinAlgError: an edge has no length, or H is singular.
+    """
+    edges, slots = springs.edges, np.zeros(len(vertices), np.int64)
+    slope = slope_at(tried_at(vertices, lengths, springs, slots), springs)
+    for i in range(len(slope.gradient)):
+        slope.hessian[i, i] += damping
+    inverse = np.linalg.inv(slope.hessian)
+    inverse = (inverse + inverse.T) / 2
+    half, coupling = np.zeros((len(edges), len(inverse))), np.empty((len(edges), len(edges)))
+    _fill_coupling(inverse, edges, slope.direction, half, coupling)
+    shift = -np.dot(inverse, slope.gradient)
+    return inverse, coupling, shift, np.dot(half, slope.gradient), slope.direction
+
+
+def quadratic_model(frame: Framework, target: Target, weight: float, damping: float) -> QuadraticModel:
+    """The model at a framework, with the weight w of the shape and the damping μ.
+
+    Raises:
+        numpy.linalg.LinAlgError: an edge has no length, or the model is singular.
+    """
+    vertices = np.array(frame.mesh.vertices)
+    springs = springs_of(frame, target, weight, "none")
+    inverse, coupling, shift, stretched, direction = _inverse_and_coupling(
+        vertices, frame.lengths.copy(), springs, damping**2
+    )
+    residual = stretched - frame.residual
+    return QuadraticModel(inverse, coupling, shift, residual, direction, frame.mesh.edge_lengths.copy(), vertices)
+
+
 @njit(cache=True, inline="always")
 def compliance(inverse: Floats, a: Ints, da: Floats, b: Ints, db: Floats) -> float:
     """J_a H⁻¹ J_bᵀ of two edges, given their ends (pairs) and unit vectors."""
@@ -79,7 +134,7 @@ def compliance(inverse: Floats, a: Ints, da: Floats, b: Ints, db: Floats) -> flo
     return total
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, _nrt=False)
 def push(inverse: Floats, shift: Floats, ends: Ints, direction: Floats, force: float) -> None:
     """Add H⁻¹ J_eᵀ `force` to `shift`: the answer of the whole mesh to a change of one wanted length."""
     for r in range(3):
@@ -114,7 +169,7 @@ def price_of_labels(
     return float(total)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, _nrt=False)
 def take_label(model: QuadraticModel, edges: Ints, e: int, step: float) -> None:
     """Let the wanted length of edge e grow by `step`."""
     row = model.coupling[e]
@@ -160,7 +215,7 @@ def price_of_flip(softness: float, across: float, own: float, old_residual: floa
     return FlipPrice(price, -old_residual / softness, misfit)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, _nrt=False)
 def _add_outer(matrix: Floats, column: Floats, factor: float) -> None:
     """Add factor · column columnᵀ."""
     for i in range(len(column)):
@@ -176,7 +231,7 @@ def _clear(values: Floats) -> None:
         values[i] = 0.0
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, _nrt=False)
 def _add_row(model: QuadraticModel, pull: Floats, sag: Floats, factor: float, force: float) -> None:
     """The rank-one change of H⁻¹ and J H⁻¹ Jᵀ, and the minimiser's answer to `force`."""
     _add_outer(model.inverse, sag, factor)
@@ -187,7 +242,7 @@ def _add_row(model: QuadraticModel, pull: Floats, sag: Floats, factor: float, fo
         model.residual[e] -= force * pull[e]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, _nrt=False)
 def take_flip(model: QuadraticModel, edges: Ints, k: int, length: float, found: FlipPrice, move: Move) -> None:
     """Take row k out and put in that of the edge in `move`; `found` is the flip's price (Sherman and Morrison 1950)."""
     pull, sag = move.pull, move.sag

@@ -5,11 +5,10 @@ An exact search meets tens to hundreds of exact meshes; this small score chooses
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
-import igl
 import numpy as np
 
+from drkid.congruence.closest_point import TriangleTree, closest_points, triangle_tree
 from drkid.measure import Dihedral, dihedral, sample
 from drkid.mesh import Floats, TriMesh
 from drkid.spec import KitSpec
@@ -21,13 +20,17 @@ UNIT_MEAN_PERCENT, UNIT_MAX_PERCENT, UNIT_DEGREES, UNIT_CONCAVE_PERCENT = 0.5, 2
 
 @dataclass(frozen=True)
 class Quality:
-    """d_H(M_s, M_f) in percent of the bounding-box diagonal, and dihedrals beyond those of M_s."""
+    """d_H(M_s, M_f) in percent of the bounding-box diagonal, and dihedrals beyond those of M_s.
+
+    `farthest` is the place of the largest distance.
+    """
 
     mean_percent: float
     max_percent: float
     p95_degrees: float
     excess_p95_degrees: float
     excess_concave_percent: float
+    farthest: tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,10 +41,8 @@ class Yardstick:
     spec: KitSpec
 
     @cached_property
-    def _tree(self) -> Any:
-        tree = igl.AABB()
-        tree.init(np.array(self.reference.vertices), np.array(self.reference.faces))
-        return tree
+    def _tree(self) -> TriangleTree:
+        return triangle_tree(self.reference)
 
     @cached_property
     def _points(self) -> Floats:
@@ -56,18 +57,19 @@ class Yardstick:
         """Of a closed mesh."""
         middles = mesh.vertices[mesh.edges].mean(axis=1)
         own = np.concatenate([mesh.vertices, middles, mesh.corners.mean(axis=1)])
-        there = self._tree.squared_distance(self.reference.vertices, self.reference.faces, own)[0]
-        tree = igl.AABB()
-        tree.init(np.array(mesh.vertices), np.array(mesh.faces))
-        back = tree.squared_distance(mesh.vertices, mesh.faces, self._points)[0]
-        there, back = np.sqrt(np.maximum(there, 0)), np.sqrt(np.maximum(back, 0))
+        there = closest_points(self._tree, own)[0]
+        back = closest_points(triangle_tree(mesh), self._points)[0]
+        there, back = np.sqrt(there), np.sqrt(back)
+        places, distances = np.concatenate([own, self._points]), np.concatenate([there, back])
+        x, y, z = places[distances.argmax()].tolist()
         percent, angles = 100 / self.reference.diagonal, dihedral(mesh)
         return Quality(
             float(there.mean() + back.mean()) / 2 * percent,
-            float(max(there.max(), back.max())) * percent,
+            float(distances.max()) * percent,
             angles.p95_degrees,
             max(0.0, angles.p95_degrees - self._angles.p95_degrees),
             max(0.0, angles.concave_percent - self._angles.concave_percent),
+            (x, y, z),
         )
 
     def score(self, quality: Quality) -> float:

@@ -10,12 +10,16 @@ from drkid.progress import Progress
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A mesh with its classes: `face_class` (F,) into `class_lengths` (k, 3); `error` is the largest, a length."""
+    """A mesh with its classes: `face_class` (F,) into `class_lengths` (k, 3); `error` is the largest, a length.
+
+    `palette_lengths` (q,) are those that the classes are made of, ascending, where the solver has a palette.
+    """
 
     mesh: TriMesh
     face_class: Ints
     class_lengths: Floats
     error: float
+    palette_lengths: Floats | None = None
 
     @property
     def percent(self) -> float:

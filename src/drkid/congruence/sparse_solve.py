@@ -1,6 +1,7 @@
 """Levenberg–Marquardt and minimum-norm Newton with sparse matrices, for meshes of hundreds to thousands of faces.
 
 The same iterations as `levenberg_marquardt` and `newton`, whose dense factorisations grow with the cube of the faces.
+What an edge error costs is a parameter: squares, or the `penalty` on what exceeds a tolerance.
 Normal matrices are factorised in symmetric mode under a minimum-degree ordering (George and Liu 1989); the palette's
 few unknowns enter by a Schur complement, in Newton by the Woodbury identity (Golub and Van Loan 2013, section 2.1.4).
 """
@@ -16,7 +17,6 @@ from drkid.congruence.framework import BETA, Framework
 from drkid.congruence.levenberg_marquardt import (
     FIRST_DAMPING,
     LEAST_GAIN,
-    TRIALS,
     Freedom,
     changed_lengths,
     palette_columns,
@@ -25,6 +25,8 @@ from drkid.congruence.newton import EXACT, ITERATIONS, LEAST_FACTOR, LONGEST_STE
 from drkid.congruence.rigidity import edge_vectors
 from drkid.congruence.target import Target
 from drkid.mesh import Floats, TriMesh
+
+TRIALS = 8  # of larger damping: a penalty is far stiffer than squares are
 
 
 class Factor(Protocol):
@@ -35,14 +37,47 @@ class Factor(Protocol):
         ...
 
 
+class Misfit(Protocol):
+    """What the errors of a framework's edges cost: a convex function of its residuals."""
+
+    def value(self, frame: Framework, /) -> float:
+        """The cost."""
+        ...
+
+    def slope(self, frame: Framework, /) -> tuple[Floats, csr_array]:
+        """Half the gradient (E,) and half the Hessian (E, E) by the residuals."""
+        ...
+
+
+@dataclass(frozen=True)
+class Squares:
+    """The sum of the squared residuals."""
+
+    def value(self, frame: Framework, /) -> float:
+        """|len(x) − L[labels]|²."""
+        return float(frame.residual @ frame.residual)
+
+    def slope(self, frame: Framework, /) -> tuple[Floats, csr_array]:
+        """The residuals and the identity."""
+        return frame.residual, csr_array(eye_array(len(frame.residual), format="csr"))
+
+
+SQUARES = Squares()
+
+
 @dataclass(frozen=True, eq=False)
 class SparseLinearisation:
-    """The merit at a framework, its gradient (3V,) and Gauss–Newton Hessian (3V, 3V) by the vertices, and J (E, 3V)."""
+    """The merit at a framework, half its gradient (3V,) and Gauss–Newton Hessian (3V, 3V) by the vertices; J (E, 3V).
+
+    `force` (E,) and `response` (E, E) are the misfit's half gradient and half Hessian by the residuals.
+    """
 
     merit: float
     gradient: Floats
     hessian: csc_array
     jacobian: csr_array
+    force: Floats
+    response: csr_array
 
 
 def factorised(matrix: csc_array) -> Factor:
@@ -78,40 +113,53 @@ def sparse_smoothness(mesh: TriMesh, beta: float = BETA) -> csr_array:
     return csr_array(eye_array(count, format="csr") + beta**2 * (laplacian.T @ laplacian))
 
 
-def sparse_merit(frame: Framework, offset: Floats, stiffness: csr_array, weight: float) -> float:
-    """|len(x) − L[labels]|² + w² oᵀ K o."""
-    return float(frame.residual @ frame.residual + weight**2 * (offset @ (stiffness @ offset)))
+def sparse_merit(
+    frame: Framework, offset: Floats, stiffness: csr_array, weight: float, misfit: Misfit = SQUARES
+) -> float:
+    """Misfit + w² oᵀ K o."""
+    return misfit.value(frame) + float(weight**2 * (offset @ (stiffness @ offset)))
 
 
-def sparse_linearised(frame: Framework, target: Target, weight: float, stiffness: csr_array) -> SparseLinearisation:
+def sparse_linearised(
+    frame: Framework, target: Target, weight: float, stiffness: csr_array, misfit: Misfit = SQUARES
+) -> SparseLinearisation:
     """Merit, gradient, Gauss–Newton Hessian and J at a framework whose K is `stiffness`."""
     count = len(frame.mesh.vertices)
     offset, normals = target.offsets(frame.mesh.vertices)
     rows = np.arange(0, 3 * count + 1, 3)
     along = csr_array((weight * normals.ravel(), np.arange(3 * count), rows), shape=(count, 3 * count))
-    jacobian = sparse_jacobian(frame)
+    jacobian, (force, response) = sparse_jacobian(frame), misfit.slope(frame)
     return SparseLinearisation(
-        sparse_merit(frame, offset, stiffness, weight),
-        np.asarray(jacobian.T @ frame.residual + weight * (along.T @ (stiffness @ offset)), np.float64),
-        csc_array(jacobian.T @ jacobian + along.T @ stiffness @ along),
+        sparse_merit(frame, offset, stiffness, weight, misfit),
+        np.asarray(jacobian.T @ force + weight * (along.T @ (stiffness @ offset)), np.float64),
+        csc_array(jacobian.T @ (response @ jacobian) + along.T @ stiffness @ along),
         jacobian,
+        force,
+        response,
     )
 
 
 def sparse_solve(
-    frame: Framework, target: Target, weight: float, freedom: Freedom = "all", iterations: int = 6
+    frame: Framework,
+    target: Target,
+    weight: float,
+    freedom: Freedom = "all",
+    iterations: int = 6,
+    *,
+    misfit: Misfit = SQUARES,
+    beta: float = BETA,
 ) -> tuple[Framework, float]:
     """As `levenberg_marquardt.solve`: the framework after at most so many iterations, and its merit, which never rises.
 
     Raises:
         numpy.linalg.LinAlgError: the mesh is degenerate beyond what damping mends.
     """
-    stiffness = sparse_smoothness(frame.mesh)
-    at, damping = sparse_linearised(frame, target, weight, stiffness), FIRST_DAMPING
+    stiffness = sparse_smoothness(frame.mesh, beta)
+    at, damping = sparse_linearised(frame, target, weight, stiffness, misfit), FIRST_DAMPING
     for _ in range(iterations):
         for _ in range(TRIALS):
             tried = _damped_step(frame, at, freedom, damping)
-            value = sparse_merit(tried, target.offsets(tried.mesh.vertices)[0], stiffness, weight)
+            value = sparse_merit(tried, target.offsets(tried.mesh.vertices)[0], stiffness, weight, misfit)
             if value < at.merit:
                 break
             damping = max(30 * damping, 1e-4)
@@ -120,18 +168,19 @@ def sparse_solve(
         gain, frame = at.merit - value, tried
         if gain < LEAST_GAIN * value:
             return frame, value
-        at, damping = sparse_linearised(frame, target, weight, stiffness), 0.2 * damping
+        at, damping = sparse_linearised(frame, target, weight, stiffness, misfit), 0.2 * damping
     return frame, at.merit
 
 
 def _damped_step(frame: Framework, at: SparseLinearisation, freedom: Freedom, damping: float) -> Framework:
     factor = factorised(_with_diagonal(at.hessian, damping))
     columns = palette_columns(frame, freedom)
-    coupling = -(at.jacobian.T @ columns)
+    answered = at.response @ columns
+    coupling = -(at.jacobian.T @ answered)
     both = factor.solve(np.column_stack([coupling, at.gradient]))
-    schur = columns.T @ columns - coupling.T @ both[:, :-1]
+    schur = columns.T @ answered - coupling.T @ both[:, :-1]
     schur[np.diag_indices_from(schur)] += 1e-9
-    step = np.asarray(np.linalg.solve(schur, columns.T @ frame.residual + coupling.T @ both[:, -1]), np.float64)
+    step = np.asarray(np.linalg.solve(schur, columns.T @ at.force + coupling.T @ both[:, -1]), np.float64)
     shift = -both[:, -1] - both[:, :-1] @ step
     return frame.moved(frame.mesh.vertices + shift.reshape(-1, 3), changed_lengths(frame, freedom, step))
 

@@ -2,14 +2,47 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import NamedTuple
 
-import igl
 import numpy as np
+from numba import njit
 
-from drkid.mesh import Floats, TriMesh
+from drkid.congruence.closest_point import TriangleTree, closest_slots, triangle_tree
+from drkid.mesh import Floats, Ints, TriMesh
 
 NORMAL_SMOOTHING = 5  # rounds of averaging of the target's vertex normals: voxels leave ripples in them
+
+
+class Surface(NamedTuple):
+    """The target: its triangles in a tree, its `faces` (F, 3) and the unit normals (V, 3) at its vertices."""
+
+    tree: TriangleTree
+    faces: Ints
+    normals: Floats
+
+
+@njit(cache=True, nogil=True)
+def signed_offsets(surface: Surface, points: Floats, slots: Ints) -> tuple[Floats, Floats]:
+    """Signed distances (n,) of points (n, 3) along the target's normals (n, 3), positive outside.
+
+    `slots` (n,) are first guesses of the nearest triangles, and then those found (see `closest_slots`).
+    """
+    squared, weights = closest_slots(surface.tree, points, slots)
+    normals = np.zeros((len(points), 3))
+    for i in range(len(points)):
+        face, corners = surface.faces[surface.tree.face[slots[i]]], surface.tree.corners[slots[i]]
+        away, size = 0.0, 0.0
+        for r in range(3):
+            closest = 0.0
+            for c in range(3):
+                normals[i, r] += weights[i, c] * surface.normals[face[c], r]
+                closest += weights[i, c] * corners[c, r]
+            away += (points[i, r] - closest) * normals[i, r]
+            size += normals[i, r] ** 2
+        squared[i] = np.copysign(np.sqrt(squared[i]), away)
+        for r in range(3):
+            normals[i, r] /= max(np.sqrt(size), 1e-300)
+    return squared, normals
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,10 +52,9 @@ class Target:
     mesh: TriMesh
 
     @cached_property
-    def _tree(self) -> Any:
-        tree = igl.AABB()
-        tree.init(np.array(self.mesh.vertices), np.array(self.mesh.faces))
-        return tree
+    def surface(self) -> Surface:
+        """In arrays, for kernels."""
+        return Surface(triangle_tree(self.mesh), np.array(self.mesh.faces), self._normals)
 
     @cached_property
     def _normals(self) -> Floats:
@@ -37,24 +69,7 @@ class Target:
 
     def offsets(self, points: Floats) -> tuple[Floats, Floats]:
         """Signed distance (n,) of points (n, 3) along the target's normals (n, 3), positive outside."""
-        squared, face, closest = self._tree.squared_distance(self.mesh.vertices, self.mesh.faces, points)
-        corners = self.mesh.faces[face]
-        weights = _barycentric(closest, self.mesh.vertices[corners])
-        normals = np.einsum("ij,ijk->ik", weights, self._normals[corners])
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-        away = np.einsum("ij,ij->i", points - closest, normals)
-        return np.copysign(np.sqrt(squared), away), normals
-
-
-def _barycentric(points: Floats, corners: Floats) -> Floats:
-    """(n, 3): barycentric coordinates of points in the planes of their triangles (Ericson 2005, section 3.4)."""
-    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    w = points - corners[:, 0]
-    uu, uv, vv = (np.einsum("ij,ij->i", a, b) for a, b in ((u, u), (u, v), (v, v)))
-    wu, wv = np.einsum("ij,ij->i", w, u), np.einsum("ij,ij->i", w, v)
-    area = np.maximum(uu * vv - uv * uv, 1e-300)
-    second, third = (vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area
-    return np.stack([1 - second - third, second, third], axis=1)
+        return signed_offsets(self.surface, np.array(points, order="C"), np.zeros(len(points), np.int64))
 
 
 def smoothness(mesh: TriMesh, beta: float) -> Floats:

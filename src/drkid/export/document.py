@@ -124,6 +124,18 @@ class GrooveDocument(Model):
     max_mm: float
 
 
+class RigidityDocument(Model):
+    """How stiff the assembled shell is; movements of the most moved vertex, in percent of mean_edge."""
+
+    firmness: Literal["stiff", "soft", "may snap through"]
+    softest: float = Field(ge=0, description="least singular value of the rigidity matrix, rigid motions apart")
+    stiffness_percent: float = Field(ge=0, description="softest, of that of a round shell of as many faces")
+    sway_percent: float = Field(ge=0, description="what a play of 0.5 % in every length allows; 100: or more")
+    fold_percent: float | None = Field(default=None, description="movement to the fold before a second state")
+    barrier_percent: float | None = Field(default=None, description="give of every length that passes this fold")
+    second_state_percent: float | None = Field(default=None, description="movement to a second state within the play")
+
+
 class MetricsDocument(Model):
     """What tables report."""
 
@@ -140,6 +152,7 @@ class MetricsDocument(Model):
     groove: GrooveDocument
     genus: int
     iterations: int
+    rigidity: RigidityDocument | None = None
     seconds: dict[str, float]
 
 

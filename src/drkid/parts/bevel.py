@@ -40,6 +40,15 @@ def bisector_insets(demand: Floats, members: Members, class_lengths: Floats) -> 
     return insets + np.maximum(-insets.mean(axis=1, keepdims=True), 0.0)
 
 
+def bevel_insets(bends_degrees: tuple[float, float], thickness_mm: float, swing_degrees: float) -> Floats:
+    """(2, 1): insets at the inner and outer face that serve every bend between a concave and a convex one, in mm.
+
+    They depend on no mesh, so that pieces of the same lengths are the same for every shape.
+    """
+    concave, convex = np.tan(np.radians(np.add(bends_degrees, swing_degrees)) / 2)
+    return thickness_mm / 2 * np.array([[convex], [concave]])
+
+
 def limited(insets_mm: Floats, deepest_mm: float, thickness_mm: float) -> Floats:
     """Insets (…, 2, 3) cut down to what leaves the connector its hold.
 

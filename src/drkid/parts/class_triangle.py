@@ -7,6 +7,7 @@ import numpy as np
 from drkid.mesh import Floats, Ints
 
 SAME_LENGTH = 2e-5  # relative: sides that differ by less are equal; far below what any process can print
+DECIMALS = 9  # of a printed length in mm
 LEFT_SIDES = (0, 2, 1)  # which class side lies at side i of a left part: ascending clockwise from outside
 LEFT_CORNERS = (1, 0, 2)  # which corner of the right part mirrors to corner i of the left part
 
@@ -22,6 +23,11 @@ def laid_down(lengths: Floats) -> Floats:
     zero = np.zeros_like(first)
     corners = np.stack([np.stack([zero, zero], -1), np.stack([first, zero], -1), np.stack([x, y], -1)], -2)
     return corners - corners.mean(axis=-2, keepdims=True)
+
+
+def printed_lengths(lengths: Floats, scale: float) -> Floats:
+    """Lengths in mm, rounded far below what prints: the same lengths, found on two shapes, then make the same file."""
+    return np.round(lengths * scale, DECIMALS)
 
 
 def inward_normals(corners: Floats) -> Floats:

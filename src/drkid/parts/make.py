@@ -9,7 +9,7 @@ import numpy as np
 from drkid.errors import FitError
 from drkid.kit import Connector, Decomposition, Dimensions, Part, PartSet, class_id
 from drkid.mesh import Floats, Ints, read_only
-from drkid.parts.class_triangle import LEFT_CORNERS, is_mirror_symmetric, laid_down
+from drkid.parts.class_triangle import LEFT_CORNERS, is_mirror_symmetric, laid_down, printed_lengths
 from drkid.parts.dimensions import proposed
 from drkid.parts.fit import FITS_MM, Margin, margins, smallest_scale
 from drkid.parts.groove import groove_mm, recesses
@@ -32,15 +32,17 @@ def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress =
     """The printed shapes of a kit: pieces with bevels and pockets, connectors, and which face uses which.
 
     One piece a class where it is its own mirror image, a left and a right one where it is not and both are used.
-    The scale makes the longest side of the mesh's bounding box `spec.size_mm`, or is the smallest at which all
-    pockets and walls fit, rounded up to whole mm of that side. Marks are engraved later.
+    The scale is the decomposition's own where given edge lengths fix it. Else it makes the longest side of the mesh's
+    bounding box `spec.size_mm`, or is the smallest at which all pockets and walls fit, rounded up to whole mm of that
+    side. Marks are engraved later.
 
     Raises:
         FitError: pockets and walls do not fit at the asked size or thickness, or a piece is larger than the bed.
     """
     progress("laying pieces on faces", 0.0)
     members = members_of(decomposition)
-    sharpest = degrees(float(np.abs(members.bend_radians).max())) + spec.swing_degrees
+    bends = spec.bevel_degrees or (degrees(float(np.abs(members.bend_radians).max())),)
+    sharpest = max(bends) + spec.swing_degrees
     design = _Design(decomposition, members, proposed(spec, sharpest), spec)
     progress("finding the size", 0.2)
     scale = _scale(design)
@@ -79,7 +81,7 @@ class _Design:
         return float(self.decomposition.mesh.extents.max())
 
     def triangles(self, scale: float) -> Floats:
-        return laid_down(self.decomposition.class_lengths * scale)
+        return laid_down(printed_lengths(self.decomposition.class_lengths, scale))
 
     def pieces(self, scale: float) -> tuple[Prismoid, ...]:
         return thickened(self.decomposition.class_lengths, self.members, self.dimensions, self.spec, scale)
@@ -94,15 +96,22 @@ class _Design:
     def slack_mm(self, scale: float) -> float:
         return self.tightest(scale)[1].slack_mm
 
-    def smallest_size_mm(self) -> int:
-        """Whole mm of the longest side at which everything fits."""
+    def smallest_scale(self) -> float:
+        """At which everything fits."""
         mean_length = float(self.decomposition.class_lengths.mean())
         guess = FIRST_GUESS_THICKNESSES * self.dimensions.thickness_mm / mean_length
-        first = ceil(smallest_scale(self.slack_mm, guess) * self.longest - WHOLE_MM)
+        return smallest_scale(self.slack_mm, guess)
+
+    def smallest_size_mm(self) -> int:
+        """Whole mm of the longest side at which everything fits."""
+        first = ceil(self.smallest_scale() * self.longest - WHOLE_MM)
         return next(size for size in count(first) if self.slack_mm(size / self.longest) >= 0)
 
 
 def _scale(design: _Design) -> float:
+    fixed = design.decomposition.scale_mm_per_unit
+    if fixed is not None:
+        return _required_scale(design, fixed)
     size = design.spec.size_mm
     if size is None:
         return design.smallest_size_mm() / design.longest
@@ -117,6 +126,24 @@ def _scale(design: _Design) -> float:
             "or a thinner rod (--rod-diameter-mm)",
         )
     return size / design.longest
+
+
+def _required_scale(design: _Design, scale: float) -> float:
+    """The scale that given edge lengths fix, if everything fits at it."""
+    index, margin = design.tightest(scale)
+    if margin.slack_mm >= FITS_MM:
+        return scale
+    sides = ", ".join(f"{x:g}" for x in np.round(design.decomposition.class_lengths[index] * scale, 6))
+    factor = design.smallest_scale() / scale
+    lengths = np.unique(np.round(design.decomposition.class_lengths * scale, 6))
+    longer = ",".join(f"{ceil(10 * factor * x) / 10:g}" for x in lengths)
+    raise FitError(
+        f"the {margin.what} of class {class_id(index)} does not fit at the given lengths (sides {sides} mm)",
+        wanted=f"{margin.needed_mm:.2f} mm",
+        found=f"{margin.available_mm:.2f} mm",
+        remedy=f"lengths {factor:.2f} times as long (--palette {longer}), a thinner rod (--rod-diameter-mm), "
+        "a finer --process, or --connector none",
+    )
 
 
 def _parts(design: _Design, shapes: tuple[Prismoid, ...], scale: float) -> tuple[tuple[Part, ...], Ints]:

@@ -29,6 +29,7 @@ def notes(
         *_connector_notes(members, dimensions),
         *_touching_notes(touching, spec),
         *_short_notes(members, dimensions, spec, recess_mm, scale),
+        *_bevel_notes(members, spec),
         *_limit_notes(members, dimensions, spec),
     )
 
@@ -60,7 +61,7 @@ def _short_notes(
     members: Members, dimensions: Dimensions, spec: KitSpec, recess_mm: Floats, scale: float
 ) -> Iterator[str]:
     """Sides whose bevel was cut down to keep the connector's hold, class by class."""
-    if spec.thickening != "bisector":
+    if spec.thickening != "bisector" or spec.bevel_degrees is not None:
         return
     rest = demanded(members, scale, dimensions.thickness_mm, 0.0)
     swung = demanded(members, scale, dimensions.thickness_mm, spec.swing_degrees)
@@ -74,6 +75,20 @@ def _short_notes(
                 f"connector would have no hold; {int((own[:, side] > TOUCH_MM).sum())} sides lack up to "
                 f"{own[:, side].max():.2f} mm and touch or cannot swing by {spec.swing_degrees:g}°."
             )
+
+
+def _bevel_notes(members: Members, spec: KitSpec) -> Iterator[str]:
+    """Joints beyond the bends that pieces are bevelled for, whatever the shape."""
+    if spec.bevel_degrees is None:
+        return
+    concave, convex = spec.bevel_degrees
+    bend = np.degrees(members.bend_radians)
+    count = int(((bend < -concave) | (bend > convex)).sum()) // 2
+    if count:
+        yield (
+            f"{count} joints bend beyond the {concave:g}° concave or {convex:g}° convex that every piece is bevelled "
+            f"for, to {bend.min():.0f}° and {bend.max():.0f}° at most: what they join touches."
+        )
 
 
 def _limit_notes(members: Members, dimensions: Dimensions, spec: KitSpec) -> Iterator[str]:

@@ -4,8 +4,8 @@ import numpy as np
 
 from drkid.kit import Dimensions
 from drkid.mesh import Floats
-from drkid.parts.bevel import bisector_insets, demanded, limited
-from drkid.parts.class_triangle import laid_down
+from drkid.parts.bevel import bevel_insets, bisector_insets, demanded, limited
+from drkid.parts.class_triangle import laid_down, printed_lengths
 from drkid.parts.dimensions import deepest_bevel_mm
 from drkid.parts.mean_normal import leaning, mean_normal_slopes
 from drkid.parts.members import Members
@@ -21,12 +21,14 @@ def thickened(
     All rules keep the class triangle as the middle surface, so that hinge axes lie on the mesh's edges.
     """
     thickness, deepest = dimensions.thickness_mm, deepest_bevel_mm(dimensions)
-    lengths_mm = class_lengths * scale
+    lengths_mm = printed_lengths(class_lengths, scale)
     if spec.thickening == "mean_normal":
         slopes = mean_normal_slopes(members, class_lengths)
         return tuple(leaning(*row, deepest, thickness) for row in zip(lengths_mm, slopes, strict=True))
     insets = np.zeros((len(class_lengths), 2, 3))
-    if spec.thickening == "bisector":
+    if spec.bevel_degrees is not None:
+        insets[:] = limited(bevel_insets(spec.bevel_degrees, thickness, spec.swing_degrees), deepest, thickness)
+    elif spec.thickening == "bisector":
         demand = demanded(members, scale, thickness, spec.swing_degrees)
         insets = limited(bisector_insets(demand, members, class_lengths), deepest, thickness)
     return tuple(

@@ -1,0 +1,171 @@
+"""Closest points on a triangle mesh, compiled and without the interpreter's lock.
+
+A bounding volume hierarchy over the triangles, halved at the median along the longest axis; a query starts from a
+triangle that is near already and visits only boxes that are nearer (Ericson 2005, sections 5.1.5 and 6.2).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from drkid.mesh import Floats, Ints, TriMesh
+
+LEAF = 4  # least number of triangles in a leaf
+DEEPEST = 64  # levels of any tree, and more than its stack ever holds
+
+
+class TriangleTree(NamedTuple):
+    """A complete binary tree: node i has the children 2 i and 2 i + 1, the root is node 1, the last half are leaves.
+
+    `low`, `high` (2 L, 3) bound the nodes; the slots of leaf number n are [n m, (n + 1) m) of `corners` (L m, 3, 3) and
+    `face` (L m,), the triangles' numbers in the mesh. A few triangles stand in two slots to fill the leaves.
+    """
+
+    low: Floats
+    high: Floats
+    corners: Floats
+    face: Ints
+
+
+def triangle_tree(mesh: TriMesh) -> TriangleTree:
+    """The tree of a mesh's triangles; one is enough."""
+    depth = max(int(np.log2(max(len(mesh.faces) / LEAF, 1))), 0)
+    leaves = 2**depth
+    order = np.resize(np.arange(len(mesh.faces)), -(-len(mesh.faces) // leaves) * leaves)
+    centroids = mesh.corners.mean(axis=1)
+    for level in range(depth):
+        groups = order.reshape(2**level, -1)
+        points = centroids[groups]
+        axis = np.ptp(points, axis=1).argmax(axis=1)
+        along = np.take_along_axis(points, axis[:, None, None], axis=2)[:, :, 0]
+        order = np.take_along_axis(groups, along.argsort(axis=1, kind="stable"), axis=1).ravel()
+    corners = np.ascontiguousarray(mesh.corners[order])
+    low, high = np.zeros((2 * leaves, 3)), np.zeros((2 * leaves, 3))
+    boxes = corners.reshape(leaves, -1, 3)
+    low[leaves:], high[leaves:] = boxes.min(axis=1), boxes.max(axis=1)
+    for level in range(depth - 1, -1, -1):
+        first, last = 2**level, 2 ** (level + 1)
+        low[first:last] = low[last : 2 * last].reshape(-1, 2, 3).min(axis=1)
+        high[first:last] = high[last : 2 * last].reshape(-1, 2, 3).max(axis=1)
+    return TriangleTree(low, high, corners, order.astype(np.int64))
+
+
+@njit(cache=True, inline="always")
+def _dot(a: tuple[float, float, float], b: tuple[float, float, float]) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(cache=True, inline="always")
+def _less(a: Floats, b: Floats) -> tuple[float, float, float]:
+    """The difference a − b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@njit(cache=True, _nrt=False)
+def _weights(triangle: Floats, point: Floats) -> tuple[float, float]:
+    """Barycentric weights of the second and third corner at the closest point (Ericson 2005, section 5.1.5)."""
+    ab, ac = _less(triangle[1], triangle[0]), _less(triangle[2], triangle[0])
+    ap, bp, cp = _less(point, triangle[0]), _less(point, triangle[1]), _less(point, triangle[2])
+    d1, d2, d3, d4, d5, d6 = _dot(ab, ap), _dot(ac, ap), _dot(ab, bp), _dot(ac, bp), _dot(ab, cp), _dot(ac, cp)
+    a, b, c = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    if d1 <= 0 and d2 <= 0:
+        second, third = 0.0, 0.0
+    elif d3 >= 0 and d4 <= d3:
+        second, third = 1.0, 0.0
+    elif d6 >= 0 and d5 <= d6:
+        second, third = 0.0, 1.0
+    elif c <= 0 and d1 >= 0 and d3 <= 0 and d1 > d3:  # equal where the first two corners coincide
+        second, third = d1 / (d1 - d3), 0.0
+    elif b <= 0 and d2 >= 0 and d6 <= 0:
+        second, third = 0.0, d2 / (d2 - d6)
+    elif a <= 0 and d4 >= d3 and d5 >= d6:
+        third = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+        second = 1.0 - third
+    else:
+        second, third = b / (a + b + c), c / (a + b + c)
+    return second, third
+
+
+@njit(cache=True, _nrt=False)
+def _squared_to_triangle(triangle: Floats, point: Floats) -> float:
+    second, third = _weights(triangle, point)
+    total = 0.0
+    for r in range(3):
+        at = triangle[0, r] + second * (triangle[1, r] - triangle[0, r]) + third * (triangle[2, r] - triangle[0, r])
+        total += (point[r] - at) ** 2
+    return total
+
+
+@njit(cache=True, _nrt=False)
+def _squared_to_box(low: Floats, high: Floats, node: int, point: Floats) -> float:
+    total = 0.0
+    for r in range(3):
+        out = max(low[node, r] - point[r], point[r] - high[node, r], 0.0)
+        total += out * out
+    return total
+
+
+@njit(cache=True, _nrt=False)
+def _nearest_in_leaf(corners: Floats, first: int, last: int, point: Floats, best: float) -> tuple[float, int]:
+    """Squared distance and slot of a triangle nearer than `best`, or `best` and −1."""
+    found = -1
+    for slot in range(first, last):
+        squared = _squared_to_triangle(corners[slot], point)
+        if squared < best:
+            best, found = squared, slot
+    return best, found
+
+
+@njit(cache=True, _nrt=False)
+def _push_children(low: Floats, high: Floats, node: int, point: Floats, stack: Ints, depth: int) -> int:
+    """Both children onto the stack, the nearer on top; the stack's new depth."""
+    nearer, farther = 2 * node, 2 * node + 1
+    if _squared_to_box(low, high, farther, point) < _squared_to_box(low, high, nearer, point):
+        nearer, farther = farther, nearer
+    stack[depth], stack[depth + 1] = farther, nearer
+    return depth + 2
+
+
+@njit(cache=True, _nrt=False)
+def _nearest(low: Floats, high: Floats, corners: Floats, point: Floats, slot: int, stack: Ints) -> tuple[float, int]:
+    """Squared distance and slot of the nearest triangle; `slot` is a first guess."""
+    leaves = len(low) // 2
+    size = len(corners) // leaves
+    best = _squared_to_triangle(corners[slot], point)
+    stack[0], depth = 1, 1
+    while depth > 0:
+        depth -= 1
+        node = stack[depth]
+        if not _squared_to_box(low, high, node, point) < best:  # so that a point that is no number visits nothing
+            continue
+        if node < leaves:
+            depth = _push_children(low, high, node, point, stack, depth)
+            continue
+        first = (node - leaves) * size
+        best, found = _nearest_in_leaf(corners, first, first + size, point, best)
+        if found >= 0:
+            slot = found
+    return best, slot
+
+
+@njit(cache=True, nogil=True)
+def closest_slots(tree: TriangleTree, points: Floats, slots: Ints) -> tuple[Floats, Floats]:
+    """Squared distances (n,) and barycentric weights (n, 3) of the points (n, 3) closest on the mesh.
+
+    `slots` (n,) hold first guesses and then the triangles found; guesses change the time it takes and nothing else.
+    """
+    stack = np.empty(DEEPEST, np.int64)
+    squared, weights = np.empty(len(points)), np.empty((len(points), 3))
+    for i in range(len(points)):
+        squared[i], slots[i] = _nearest(tree.low, tree.high, tree.corners, points[i], slots[i], stack)
+        second, third = _weights(tree.corners[slots[i]], points[i])
+        weights[i, 0], weights[i, 1], weights[i, 2] = 1.0 - second - third, second, third
+    return squared, weights
+
+
+def closest_points(tree: TriangleTree, points: Floats) -> tuple[Floats, Ints, Floats]:
+    """Squared distances (n,) of points (n, 3), the nearest triangles (n,) and the closest points (n, 3)."""
+    slots = np.zeros(len(points), np.int64)
+    squared, weights = closest_slots(tree, np.ascontiguousarray(points), slots)
+    return squared, tree.face[slots], np.einsum("ij,ijk->ik", weights, tree.corners[slots])
