@@ -31,9 +31,10 @@ $(VENV)/.lint: $(BIN)/python pyproject.toml constraints.txt
 	$(PIP) install -c constraints.txt -e ".[test,lint]"
 	@touch $@ $(VENV)/.test $(VENV)/.run
 
-# Exit status 3 is no failure of the demonstration: the kit is there, and the table says how good it is.
+# Rounds in place of a time: the same kit on every machine, though the first run compiles while the clock ticks.
+# Exit status 3 would be no failure: the kit is there, and the table says how good it is.
 demo: $(VENV)/.run
-	$(BIN)/drkid make --out demo-kit --force || test $$? -eq 3
+	$(BIN)/drkid make --rounds 40 --out demo-kit --force || test $$? -eq 3
 
 test: $(VENV)/.test
 	$(BIN)/python -m pytest -n $(WORKERS) --cov --cov-report=term:skip-covered

@@ -80,7 +80,12 @@ CHOICES = (
 def one_run(surface: Surface, choice: Choice, faces: int, seed: int, iterations: int) -> dict:
     """The figures of one run, simplification not timed."""
     spec = KitSpec(
-        faces=faces, classes=7, seed=seed, tolerance_percent=OUT_OF_REACH_PERCENT, max_iterations=iterations
+        method="pressure",
+        faces=faces,
+        classes=7,
+        seed=seed,
+        tolerance_percent=OUT_OF_REACH_PERCENT,
+        max_iterations=iterations,
     ).model_copy(update=choice.changes)
     simplified = simplify(surface, spec).mesh
     start = time.perf_counter()

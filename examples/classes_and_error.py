@@ -1,4 +1,4 @@
-"""How many classes does a shape need? The largest error and the moulds for a few k.
+"""How many classes does a shape need with the paper's solver? The largest error and the moulds for a few k.
 
 python examples/classes_and_error.py
 """
@@ -13,7 +13,8 @@ def main(classes: Iterable[int] = (2, 4, 7, 10), faces: int = 172, iterations: i
     print(f"{'k':>3}{'moulds':>8}{'largest error %':>17}{'mean error %':>14}{'distance mean / max %':>24}  outcome")
     kits: list[drkid.Kit] = []
     for k in classes:
-        kit = drkid.make_kit(spec=drkid.KitSpec(faces=faces, classes=k, max_iterations=iterations))
+        spec = drkid.KitSpec(method="pressure", faces=faces, classes=k, max_iterations=iterations)
+        kit = drkid.make_kit(spec=spec)
         m = kit.metrics
         distance = f"{m.surface_assembled.mean_percent:.2f} / {m.surface_assembled.max_percent:.2f}"
         print(

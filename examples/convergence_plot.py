@@ -1,5 +1,7 @@
 """Plot how the solver converges, from a written kit.json (needs matplotlib: the extra `figures`).
 
+The paper's solver (`drkid make --method pressure`) has the longer way: the palette solver is often exact at once.
+
 python examples/convergence_plot.py KIT [PICTURE]
 """
 
@@ -20,7 +22,7 @@ def main(kit: str, picture: str = "convergence.png") -> Path:
     for name in ("error_max_percent", "error_mean_percent"):
         axis.semilogy([r["iteration"] for r in records], [r[name] for r in records], label=name)
     axis.axhline(document["spec"]["tolerance_percent"], color="0.5", linestyle="--", label="tolerance_percent")
-    axis.set(xlabel="iteration", ylabel="% of the mean edge", title=document["outcome"]["message"])
+    axis.set(xlabel="iteration or round", ylabel="% of the mean edge", title=document["outcome"]["message"])
     axis.legend()
     figure.savefig(picture)
     plt.close(figure)

@@ -10,9 +10,10 @@ import pytest
 import drkid
 from drkid import __version__
 from drkid.cli import run
+from drkid.commands import _spec
 from drkid.spec import KitSpec
 
-QUICK = ["--faces", "40", "--classes", "3", "--max-iterations", "300"]
+QUICK = ["--faces", "40", "--method", "pressure", "--classes", "3", "--max-iterations", "300"]
 
 
 def plain(text: str) -> str:
@@ -132,7 +133,7 @@ def refused(arguments: list[str], capsys) -> str:
         (["--spacing", "1,2"], ["spacing"]),
         (["--process", "wood"], ["wood", "fdm"]),
         (["--facs", "40"], ["--facs", "--faces"]),
-        (["--method", "palette", "--classes", "11"], ["11", "--method pressure"]),
+        (["--classes", "11"], ["11", "--method pressure"]),
         (["--spec", "nowhere.toml"], ["nowhere.toml", "cannot be read"]),
         (["--label", "3"], ["label"]),
     ],
@@ -173,12 +174,50 @@ def test_a_print_too_small_for_its_hinges_is_refused_with_remedies(potato_file, 
 
 def test_parameters_come_from_toml_and_flags_override_them(potato_file, tmp_path, capsys):
     spec = tmp_path / "spec.toml"
-    spec.write_text('faces = 60\nclasses = 3\nmax_iterations = 200\nconnector = "none"\ntolerance_percent = 50\n')
+    spec.write_text(
+        'faces = 60\nmethod = "pressure"\nclasses = 3\nmax_iterations = 200\nconnector = "none"\n'
+        "tolerance_percent = 50\n"
+    )
     arguments = ["make", str(potato_file), "--out", str(tmp_path / "kit"), "--spec", str(spec), "--vertices", "22"]
     assert run([*arguments, "--json"]) == 0
     summary = json.loads(capsys.readouterr().out)
     assert summary["metrics"]["pieces"] <= 40
     assert summary["spec"]["connector"] == "none"
+
+
+@pytest.mark.parametrize(
+    ("file", "flags", "expected"),
+    [
+        ({"rounds": 7}, {"seconds": 5.0}, {"rounds": None, "seconds": 5.0}),
+        ({"rounds": 7}, {"seed": 3}, {"rounds": 7, "seed": 3}),
+        (
+            {"method": "palette", "classes": 2, "rounds": 7, "tolerance_percent": 0.1},
+            {"method": "pressure"},
+            {"classes": 7, "rounds": None, "tolerance_percent": None},
+        ),
+        (
+            {"method": "pressure", "classes": 7, "tolerance_percent": 1.5},
+            {"method": "palette"},
+            {"classes": 2, "tolerance_percent": None},
+        ),
+        (
+            {"method": "pressure", "classes": 7, "tolerance_percent": 1.5},
+            {"multisets": "ssl"},
+            {"method": "palette", "classes": 1, "tolerance_percent": None},
+        ),
+        (
+            {"classes": 5, "tolerance_percent": 2.0},
+            {"method": "pressure"},
+            {"classes": 5, "tolerance_percent": 2.0},
+        ),
+        ({"method": "pressure", "classes": 6}, {"method": "pressure"}, {"classes": 6}),
+    ],
+)
+def test_a_flag_takes_the_place_of_what_a_file_has_chosen_for_another(file, flags, expected, tmp_path):
+    path = tmp_path / "kit.json"
+    path.write_text(json.dumps({"spec": file}))
+    spec = _spec(path, flags)
+    assert {name: getattr(spec, name) for name in expected} == expected
 
 
 @pytest.mark.parametrize("content", ["[1, 2]", "{broken", '{"spec": {"colour": 3}}'])

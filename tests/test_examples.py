@@ -18,13 +18,14 @@ def test_every_example_is_run_here():
 @pytest.fixture(scope="module")
 def written_kit(tmp_path_factory):
     folder = tmp_path_factory.mktemp("examples") / "kit"
-    return load_script(EXAMPLES / "first_kit.py").main(str(folder), faces=80), folder
+    return load_script(EXAMPLES / "first_kit.py").main(str(folder), faces=80, rounds=1), folder
 
 
 def test_first_kit(written_kit):
     kit, folder = written_kit
     document = json.loads((folder / "kit.json").read_text())
     assert sum(one["count"] for one in document["classes"]) == kit.metrics.pieces == 80
+    assert len(kit.part_set.parts) == 2
 
 
 def test_classes_and_error(capsys):
@@ -34,7 +35,7 @@ def test_classes_and_error(capsys):
 
 
 def test_processes(capsys):
-    kits = load_script(EXAMPLES / "processes.py").main(faces=80)
+    kits = load_script(EXAMPLES / "processes.py").main(faces=60, rounds=0)
     assert kits["sla"].spec.size_mm < kits["fdm"].spec.size_mm
     said = capsys.readouterr().out
     assert all(f"{kit.spec.size_mm:.0f}" in said for kit in kits.values())

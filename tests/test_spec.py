@@ -4,7 +4,7 @@ from hypothesis import strategies as st
 
 import drkid
 from drkid.errors import SpecError
-from drkid.spec import PROCESSES, UNIVERSAL, UNIVERSAL_BEVEL, KitSpec, multiset_words
+from drkid.spec import MOST_WALKED_FACES, PROCESSES, UNIVERSAL, UNIVERSAL_BEVEL, KitSpec, multiset_words
 
 
 @pytest.mark.parametrize(
@@ -16,6 +16,9 @@ from drkid.spec import PROCESSES, UNIVERSAL, UNIVERSAL_BEVEL, KitSpec, multiset_
         ({"faces": 8, "vertices": 6}, ["both given"]),
         ({"thickness_mm": -1}, ["thickness_mm", "greater than 0", "-1"]),
         ({"tolerance_percent": float("nan")}, ["tolerance_percent", "nan"]),
+        ({"tolerance_percent": 0}, ["tolerance_percent", "greater than 0"]),
+        ({"rounds": -1}, ["rounds", "greater than or equal to 0", "-1"]),
+        ({"seconds": 0}, ["seconds", "greater than 0"]),
         ({"knuckles": 3}, ["knuckles is 3", "even"]),
         ({"process": "wood"}, ["process", "'fdm'", "wood"]),
         ({"spacing": "1,2"}, ["spacing"]),
@@ -83,6 +86,40 @@ def test_every_field_has_help_and_a_group():
 def test_a_spec_survives_the_way_through_json():
     spec = KitSpec(faces=100, spacing=(1, 2, 3), seed=5)
     assert KitSpec.parse(spec.model_dump(mode="json")) == spec
+
+
+@pytest.mark.parametrize(
+    ("values", "method", "classes"),
+    [
+        ({}, "palette", 2),
+        ({"method": "palette"}, "palette", 2),
+        ({"classes": 5}, "palette", 5),
+        ({"method": "pressure"}, "pressure", 7),
+        ({"method": "pressure", "classes": 5}, "pressure", 5),
+    ],
+)
+def test_the_method_implies_a_number_of_classes(values, method, classes):
+    spec = KitSpec.parse(values)
+    assert (spec.method, spec.classes) == (method, classes)
+    assert KitSpec.parse(spec.model_dump(mode="json")) == spec
+
+
+@given(st.integers(4, 10_000), st.floats(0.001, 50))
+def test_the_tolerance_that_is_given_holds_for_every_mesh_and_method(faces, percent):
+    for method in ("palette", "pressure"):
+        assert KitSpec(method=method, tolerance_percent=percent).tolerance_for(faces) == percent
+
+
+@given(st.integers(4, 10_000))
+def test_the_tolerance_that_is_not_given_follows_from_method_and_faces(faces):
+    found = KitSpec().tolerance_for(faces)
+    assert found == (0.1 if faces <= MOST_WALKED_FACES else 1)
+    assert found < KitSpec(method="pressure").tolerance_for(faces) == 1.5
+    assert KitSpec(palette="universal").tolerance_for(faces) == found
+
+
+def test_no_rounds_at_all_may_be_asked_for():
+    assert KitSpec.parse({"rounds": 0}).rounds == 0
 
 
 @pytest.mark.parametrize(

@@ -18,18 +18,29 @@ import matplotlib.pyplot as plt
 import numpy as np
 import trimesh
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from PIL import Image
 from render import Body, camera, colour, render
 
-from drkid import Kit, make_kit
+from drkid import Kit, KitSpec, make_kit
 from drkid.assembly import assemble
+from drkid.congruence.annealing import Schedule, anneal
+from drkid.congruence.framework import Framework
+from drkid.congruence.hop import START_DAMPING, START_HEAT, START_STEPS_PER_FACE, START_WEIGHTS
+from drkid.congruence.labelling import nearest_labels
+from drkid.congruence.levenberg_marquardt import solve
+from drkid.congruence.palette import Palette, palette_of_classes
+from drkid.congruence.quadratic_model import connectivity, quadratic_model
+from drkid.congruence.target import Target
 from drkid.export.colour import CONNECTOR_COLOUR, class_colour
-from drkid.mesh import Floats, TriMesh
+from drkid.mesh import Bools, Floats, TriMesh
 from drkid.parts import make_parts
 from drkid.solid import Solid
 
 HERE = Path(__file__).parent
+RESULTS = HERE.parents[1] / "benchmarks" / "results"
 RULES = ("bisector", "mean_normal", "perpendicular")
+ROUNDS = 80  # what ten seconds hold on two cores: the same kit on any machine
 SPECK_MM3 = 0.01  # overlaps below this are rounding
 VIEW = camera(-62, 34)
 STEEL = np.array([0.78, 0.79, 0.82])
@@ -39,13 +50,17 @@ SHAPE_NAMES = {
     "cells3d_nuclei_labels.ome.tif": "nucleus",
     "asteroid_itokawa.obj": "Itokawa",
 }
+ROD_SIDES = 8  # of an edge that is drawn as a rod
+SAME_WEIGHT = 0.1  # of the shape, at which labels are compared
+TIMED_FACES = 172
+PALETTES = {2: "k = 2", 4: "k = 4", 10: "k = 10", "universal": "universal pair"}
 SURFACE_COLOUR = np.array([0.80, 0.80, 0.83])
 
 
 @cache
 def nucleus_kit() -> Kit:
-    """The kit that `drkid make` makes."""
-    return make_kit()
+    """The kit that `drkid make --rounds 80` makes."""
+    return make_kit(spec=KitSpec(rounds=ROUNDS))
 
 
 def placed(kit: Kit, spread: Callable[[Floats], float] = lambda _: 0.0) -> list[Body]:
@@ -105,8 +120,8 @@ def walk() -> None:
 
 
 def convergence() -> None:
-    """The solver's errors and energy over its iterations."""
-    made = nucleus_kit()
+    """The pressure solver's errors and energy over its iterations."""
+    made = make_kit(spec=KitSpec(method="pressure"))
     records = made.decomposition.convergence
     iterations = [record.iteration for record in records]
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.2), layout="constrained")
@@ -229,7 +244,7 @@ def fill(axis: Axes, solid: Solid, tint: Floats) -> None:
 
 def choices() -> None:
     """What the open choices do to T, from benchmarks/results/pressure_choices.json."""
-    document = json.loads((HERE.parents[1] / "benchmarks" / "results" / "pressure_choices.json").read_text())
+    document = json.loads((RESULTS / "pressure_choices.json").read_text())
     names = list(dict.fromkeys(r["choice"] for r in document["rows"]))
     shapes = list(dict.fromkeys((r["shape"], r["faces_simplified"]) for r in document["rows"]))
     figure, axis = plt.subplots(figsize=(8, 3.4), layout="constrained")
@@ -246,6 +261,201 @@ def choices() -> None:
     axis.grid(axis="x", color="0.9")
     axis.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1, 0.5))
     figure.savefig(HERE / "choices.png", dpi=130)
+
+
+# ---- the palette solver
+
+
+def edged(mesh: TriMesh, edge_colours: Floats, radius: float = 0.035) -> Body:
+    """A mesh with a rod along each edge, coloured (E, 3), its radius in mean edges."""
+    ends = mesh.vertices[mesh.edges]
+    along = ends[:, 1] - ends[:, 0]
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    across = np.cross(along, np.eye(3)[np.abs(along).argmin(axis=1)])
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    turns = np.arange(ROD_SIDES) * 2 * np.pi / ROD_SIDES
+    ring = np.cos(turns)[:, None] * across[:, None] + np.sin(turns)[:, None] * np.cross(along, across)[:, None]
+    rods = (ends[:, :, None] + radius * mesh.mean_edge * ring[:, None]).reshape(-1, 3)
+    a = np.arange(ROD_SIDES)
+    b = (a + 1) % ROD_SIDES
+    sides = np.concatenate([np.stack([a, b, b + ROD_SIDES], 1), np.stack([a, b + ROD_SIDES, a + ROD_SIDES], 1)])
+    corners = mesh.corners.reshape(-1, 3)  # faces of their own: shaded flat
+    first = len(corners) + 2 * ROD_SIDES * np.arange(len(ends))
+    faces = np.concatenate([np.arange(len(corners)).reshape(-1, 3), (first[:, None, None] + sides).reshape(-1, 3)])
+    colours = np.repeat(edge_colours, len(sides), axis=0)
+    plain = np.tile(SURFACE_COLOUR, (len(mesh.faces), 1))
+    return Body(TriMesh(np.concatenate([corners, rods]), faces), np.concatenate([plain, colours]), smooth=True)
+
+
+def shown(axis: Axes, picture: Floats, title: str) -> None:
+    """A rendered picture in a figure."""
+    axis.imshow(picture, interpolation="lanczos")
+    axis.set_title(title, fontsize=9)
+    axis.axis("off")
+
+
+def written(figure: Figure, name: str) -> None:
+    """Save a figure in few colours: rendered pictures are large otherwise."""
+    figure.savefig(HERE / name, dpi=130, bbox_inches="tight")
+    plt.close(figure)
+    with Image.open(HERE / name) as image:
+        small = image.convert("RGB").quantize(256, dither=Image.Dither.NONE)
+    small.save(HERE / name, optimize=True)
+
+
+def rigid() -> None:
+    """As many edges as freedoms: M_s with its many lengths, M_f with two."""
+    made = nucleus_kit()
+    meshes = (made.simplified, made.decomposition.mesh)
+    lengths = [mesh.edge_lengths / mesh.mean_edge for mesh in meshes]
+    low, high = min(map(np.min, lengths)), max(map(np.max, lengths))
+    count = [len(np.unique(own.round(6))) for own in lengths]
+
+    def share(length: Floats) -> Floats:
+        return np.clip((length - low) / (high - low), 0, 1)
+
+    figure, axes = plt.subplots(2, 2, figsize=(9, 5.6), height_ratios=(2.3, 1), layout="constrained")
+    for i, (name, mesh, own) in enumerate(zip(("$M_s$", "$M_f$"), meshes, lengths, strict=True)):
+        tints = mpl.colormaps["viridis"](0.95 * share(own))[:, :3]
+        corners, edges = len(mesh.vertices), len(mesh.edges)
+        caption = f"{name}: $E$ = {edges} = 3 · {corners} − 6 edges of {count[i]} lengths"
+        shown(axes[0, i], render([edged(mesh, tints)], VIEW, 560), caption)
+        heights, bounds = np.histogram(own, np.linspace(low - 0.01, high + 0.01, 60))
+        middles = (bounds[1:] + bounds[:-1]) / 2
+        axes[1, i].bar(middles, heights, np.diff(bounds), color=mpl.colormaps["viridis"](0.95 * share(middles)))
+        axes[1, i].set(xlabel="length, mean edges", ylabel="edges")
+    written(figure, "rigid.png")
+
+
+def diffusion() -> None:
+    """Edges rounded to the nearest of two lengths, and labels annealed so that misfits cancel at a distance."""
+    mesh = nucleus_kit().simplified
+    unit = mesh.scaled(1 / mesh.mean_edge)
+    target = Target(nucleus_kit().surface.scaled(1 / mesh.mean_edge))
+    palette = palette_of_classes(4)  # every triangle of two lengths is allowed: no label needs repair
+    ratios = np.array(palette.ratios)
+    nearest = nearest_labels(unit, ratios / ratios.mean())
+    rounded = Framework(unit, nearest, palette.lengths(1.0, nearest))
+    diffused = relabelled(rounded, target, palette)
+    figure, axes = plt.subplots(2, 3, figsize=(11, 5.3), width_ratios=(1.1, 1.1, 1), layout="constrained")
+    reaches, words = (0.12, 0.02), ("before anything moves", "what is left when solved")
+    for column, (name, labels) in enumerate((("nearest length", nearest), ("annealed labels", diffused.labels))):
+        before = Framework(unit, labels, palette.lengths(1.0, labels))
+        after, _ = solve(before, target, SAME_WEIGHT, "scale", 40)
+        for line, frame, reach, when in zip(axes, (before, after), reaches, words, strict=True):
+            misfit, offsets = frame.residual, target.offsets(frame.mesh.vertices)[0]
+            caption = f"{name}: {when}\nsum of squares {(misfit**2).sum():#.2g}"
+            caption += f", {np.sqrt((offsets**2).mean()):.2f} edges off the surface" if frame is after else ""
+            tints = mpl.colormaps["coolwarm"]((1 + np.clip(misfit / reach, -1, 1)) / 2)[:, :3]
+            shown(line[column], render([edged(frame.mesh, tints, 0.05)], VIEW, 480), caption)
+            bins, label = np.linspace(-200 * reach, 200 * reach, 41), f"{name}, up to {100 * abs(misfit).max():.1f} %"
+            line[2].hist(100 * misfit, bins, color=class_colour((6, 2)[column]), histtype="step", lw=1.4, label=label)
+    for axis in axes[:, 2]:
+        axis.set(xlabel="misfit, % of the mean edge", ylabel="edges")
+        axis.legend(frameon=False, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    written(figure, "diffusion.png")
+
+
+def relabelled(frame: Framework, target: Target, palette: Palette) -> Framework:
+    """A start as `drkid.congruence.hop.start` makes it, but without flips: M_s keeps its edges."""
+    rng = np.random.default_rng(0)
+    every = np.ones(len(frame.labels), np.bool_)
+    for weight in START_WEIGHTS:
+        for _ in range(2):
+            model, net = quadratic_model(frame, target, weight, START_DAMPING), connectivity(frame.mesh)
+            labels, (short, long) = frame.labels.copy(), frame.lengths
+            heat = START_HEAT * float((1 - np.diag(model.coupling)).mean() * (long - short) ** 2)
+            schedule = Schedule(heat, START_STEPS_PER_FACE * len(net.faces), 0.0, np.flatnonzero(every), every)
+            anneal(net, model, labels, frame.lengths, palette.allowed.copy(), rng, schedule)
+            vertices = frame.mesh.vertices + model.shift.reshape(-1, 3)
+            frame, _ = solve(Framework(frame.mesh.moved(vertices), labels, frame.lengths), target, weight, "scale", 4)
+    return frame
+
+
+def fold() -> None:
+    """Two meshes have given lengths, or none: the curve of a shallow pyramid, and its states."""
+    height = 0.3
+    figure = plt.figure(figsize=(10, 3.9), layout="constrained")
+    left, right = figure.subfigures(1, 2, width_ratios=(1.6, 1))
+    draw_curve(left.subplots(), height)
+    states = (("up", height), ("the fold, flat", 0.0), ("down", -height))
+    for axis, (name, tip) in zip(right.subplots(3, 1), states, strict=True):
+        shown(axis, render([pyramid(tip)], camera(-75, 24), 520), f"{name}: legs of {np.hypot(1, tip):.3f}")
+    written(figure, "fold.png")
+
+
+def draw_curve(axis: Axes, height: float) -> None:
+    """The lengths of a pyramid's six legs as its tip goes down: to second order, and as they are.
+
+    With the tip alone moving along its axis the tension y is the same in all legs, so that J v = √6 · height / leg, and
+    one leg's bending is 1 / (2 leg³).
+    """
+    leg = float(np.hypot(1, height))
+    value, curvature = np.sqrt(6) * height / leg, np.sqrt(6) / (2 * leg**3)
+    lowest, t = -(value**2) / (4 * curvature), np.linspace(-0.85, 0.25, 200)
+    axis.axhspan(lowest, 0.25, color=class_colour(2), alpha=0.16, lw=0)
+    axis.axhspan(-0.25, lowest, color=RED, alpha=0.12, lw=0)
+    axis.plot(t, value * t + curvature * t**2, color="0.1", label="$c = σ t + S t^2$")
+    exact = np.sqrt(6) * (np.hypot(1, height + t) - leg)
+    axis.plot(t, exact, color="0.1", ls=":", label="the pyramid's legs as they are")
+    for wanted, said in ((0.1, "this $c$: two meshes"), (-0.17, "this $c$: no mesh")):
+        axis.axhline(wanted, color="0.45", lw=0.8, ls="--")
+        axis.text(-0.33, wanted, said, ha="center", va="bottom", fontsize=9)
+    for name, at, place in (("up", 0, (6, -11)), ("the fold", 0.5, (8, -11)), ("down", 1, (-36, -11))):
+        point = -value / curvature * at, lowest * 4 * at * (1 - at)
+        axis.plot(*point, "o", color="0.1", ms=5)
+        axis.annotate(name, point, place, textcoords="offset points", fontsize=9)
+    axis.text(-0.33, 0.2, "solvable: $σ^2 + 4 S c ≥ 0$", fontsize=9, ha="center")
+    axis.text(-0.33, -0.23, "not solvable: other labels, or none", fontsize=9, ha="center")
+    axis.set(
+        xlabel="$t$: movement along the flex", ylabel="$c$: change of lengths", xlim=t[[0, -1]], ylim=(-0.25, 0.25)
+    )
+    axis.legend(frameon=False, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+
+
+def pyramid(tip: float) -> Body:
+    """On a hexagon of radius 1, open below."""
+    turns = np.arange(6) * np.pi / 3
+    rim = np.stack([np.cos(turns), np.sin(turns), np.zeros(6)], axis=1)
+    faces = np.array([[i, (i + 1) % 6, 6] for i in range(6)])
+    return Body(TriMesh(np.vstack([rim, [0, 0, tip]]), faces), colour(class_colour(1)), edges=True)
+
+
+def time_to_quality(results: Path = RESULTS / "congruence.json") -> None:
+    """How near the best mesh is, and what share of the searches is exact, over the seconds."""
+    rows = [r for r in json.loads(results.read_text()) if r["faces"] == TIMED_FACES]
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.5), width_ratios=(1.3, 1), layout="constrained")
+    for number, (palette, name) in enumerate(PALETTES.items()):
+        curves = [r["curve"] for r in rows if r["palette"] == palette]
+        if not curves:
+            continue
+        tint = class_colour((0, 2, 6, 4)[number])
+        seconds = np.linspace(0, max(curve[-1]["seconds"] for curve in curves), 600)
+        distances, exact = (np.array(both) for both in zip(*(known(c, seconds) for c in curves), strict=True))
+        begun = np.isfinite(distances).all(axis=0)
+        low, middle, high = np.quantile(distances[:, begun], (0.25, 0.5, 0.75), axis=0)
+        done = exact[:, begun].mean(axis=0) >= 0.5
+        left.fill_between(seconds[begun], low, high, color=tint, alpha=0.15, lw=0)
+        left.plot(seconds[begun], np.where(done, np.nan, middle), color=tint, ls=":", lw=1.4)
+        left.plot(seconds[begun], np.where(done, middle, np.nan), color=tint, label=name)
+        right.step(seconds, 100 * exact.mean(axis=0), color=tint, where="post", label=f"{name}, {len(curves)} runs")
+    left.set(xlabel="s", ylabel="mean $d_H(M_s, M_f)$, % of the diagonal", ylim=(0, None))
+    right.set(xlabel="s", ylabel="exact, % of the runs", ylim=(0, 103))
+    for axis, place in ((left, "lower right"), (right, "lower right")):
+        axis.set_xlim(0, None)
+        axis.legend(frameon=False, fontsize=8, loc=place)
+    figure.savefig(HERE / "time-to-quality.png", dpi=130)
+
+
+def known(curve: Sequence[dict], seconds: Floats) -> tuple[Floats, Bools]:
+    """The mean distance of the best mesh at these times, NaN before there is one, and whether it is exact."""
+    last = np.searchsorted([at["seconds"] for at in curve], seconds, side="right") - 1
+    distances = np.array([at["distance_percent"][0] for at in curve])[last]
+    exact = np.array([at["exact"] for at in curve])[last]
+    return np.where(last < 0, np.nan, distances), exact & (last >= 0)
+
+
+# ---- pictures side by side
 
 
 def row(name: str, pictures: Sequence[Floats], captions: Sequence[str]) -> None:
@@ -267,7 +477,19 @@ def _room(missing: int) -> tuple[tuple[int, int], ...]:
     return (missing // 2, missing - missing // 2), (0, 0), (0, 0)
 
 
-FIGURES = {figure.__name__: figure for figure in (kit, walk, convergence, parts, thickening, choices)}
+FUNCTIONS = (
+    kit,
+    walk,
+    convergence,
+    parts,
+    thickening,
+    choices,
+    rigid,
+    diffusion,
+    fold,
+    time_to_quality,
+)
+FIGURES = {figure.__name__: figure for figure in FUNCTIONS}
 
 
 def main() -> None:

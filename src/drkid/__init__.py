@@ -3,7 +3,7 @@
 ```python
 import drkid
 
-kit = drkid.make_kit("mitochondrion.nii.gz", drkid.KitSpec(faces=172, classes=7))
+kit = drkid.make_kit("mitochondrion.nii.gz", drkid.KitSpec(faces=172))
 kit.write("mitochondrion-kit")
 ```
 """

@@ -66,8 +66,11 @@ def _spec(file: Path | None, flags: dict[str, Any]) -> KitSpec:
 def _replaced(values: dict[str, Any], given: dict[str, Any]) -> set[str]:
     """Parameters of a file that no longer hold because a flag takes their place, or what follows from them changes."""
     replaced = {"vertices"} if "faces" in given else {"faces"} if "vertices" in given else set[str]()
+    replaced |= _chosen_for_the_method(values, given)
     if "classes" in given:
         replaced.add("multisets")
+    if "seconds" in given:
+        replaced.add("rounds")
     if given.get("method", "palette") != "palette":
         return replaced | PALETTE
     if given.keys() & {"palette", "like"}:
@@ -78,6 +81,13 @@ def _replaced(values: dict[str, Any], given: dict[str, Any]) -> set[str]:
     if lengths_given and "size_mm" in given and not given.keys() & {"faces", "vertices"}:
         replaced |= {"faces", "vertices"}
     return replaced
+
+
+def _chosen_for_the_method(values: dict[str, Any], given: dict[str, Any]) -> set[str]:
+    """What a file that names its method, as a kit.json does, has for that method alone, if a flag asks for another."""
+    own = values.get("method")
+    asked = given.get("method", "palette" if given.keys() & PALETTE else own)
+    return {"classes", "tolerance_percent", "rounds"} if own not in (None, asked) else set()
 
 
 def _spec_file(path: Path) -> dict[str, Any]:
@@ -131,7 +141,8 @@ def make(
 
     Examples:
         drkid make
-        drkid make mitochondrion.nii.gz --faces 172 --classes 7 --out mito
+        drkid make mitochondrion.nii.gz --faces 172 --seconds 30 --out mito
+        drkid make mitochondrion.nii.gz --method pressure --classes 7
         drkid make labels.tif --label 12 --size-mm 250 --process sla
         drkid make vesicle.mrc --palette universal --size-mm 300
         drkid make other.stl --like mito --out other

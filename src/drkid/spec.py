@@ -16,6 +16,9 @@ ConnectorKind = Literal["hinge", "box", "none"]
 Unit = Literal["angstrom", "nm", "um", "mm"]
 
 DEFAULT_FACES = 172  # the size of the paper's printed mitochondrion (table 1, M4)
+PRESSURE_CLASSES = 7  # of the same print
+MOST_WALKED_FACES = 800  # up to here exactness is sought, beyond it a tolerance is kept
+EXACT_TOLERANCE, LARGE_TOLERANCE, PRESSURE_TOLERANCE = 0.1, 1.0, 1.5  # in percent of the mean edge
 
 UNIVERSAL = (32.0, 37.5)
 """Two edge lengths in mm of which every organic shape can be built: ratio 1.17, room for every process's connectors."""
@@ -158,8 +161,12 @@ class KitSpec(BaseModel):
     lloyd_iterations: int = _field(5, "Mesh", "Lloyd iterations of the Voronoi remeshing.", ge=0, le=1000)
     newton_iterations: int = _field(30, "Mesh", "Quasi-Newton (L-BFGS) iterations that follow.", ge=0, le=10000)
 
-    classes: int = _field(7, "Congruence", "Number k of classes of identical pieces.", ge=1)
-    method: Method = _field("pressure", "Congruence", "Solver that makes the pieces of a class alike.")
+    classes: int = _field(2, "Congruence", "Number k of classes of identical pieces; 7 with --method pressure.", ge=1)
+    method: Method = _field(
+        "palette",
+        "Congruence",
+        "Solver: palette (exact, up to 10 classes), or pressure (the paper's, any number of classes).",
+    )
     palette: Lengths | None = _field(
         None,
         "Congruence",
@@ -172,14 +179,19 @@ class KitSpec(BaseModel):
     multisets: Multisets | None = _field(
         None, "Congruence", "Triangles by their lengths, short and long: ssl,sll; of three lengths: aab,abc,bcc."
     )
-    tolerance_percent: float = _field(
-        1.5, "Congruence", "Largest error of a piece that counts as converged, in percent of the mean edge.", gt=0
+    tolerance_percent: float | None = _field(
+        None,
+        "Congruence",
+        "Largest error of a piece that counts as converged, in percent of the mean edge; when not given "
+        f"{EXACT_TOLERANCE:g}, {LARGE_TOLERANCE:g} above {MOST_WALKED_FACES} faces, {PRESSURE_TOLERANCE:g} with "
+        "--method pressure.",
+        gt=0,
     )
     seconds: float | None = _field(
         None, "Congruence", "Time for the palette solver; by the number of faces when not given.", gt=0
     )
     rounds: int | None = _field(
-        None, "Congruence", "Rounds of the palette solver in place of a time: the same rounds make the same kit.", ge=1
+        None, "Congruence", "Rounds of the palette solver in place of a time: the same rounds make the same kit.", ge=0
     )
     weight_mean: float = _field(1.0, "Congruence", "Weight of the mean distance in choosing an exact mesh.", ge=0)
     weight_max: float = _field(1.0, "Congruence", "Weight of the largest distance.", ge=0)
@@ -228,7 +240,7 @@ class KitSpec(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _implied(cls, values: object) -> object:
-        """Lengths or triangles from outside imply the palette solver, and the number of classes."""
+        """The method implies a number of classes, lengths or triangles from outside imply both."""
         if not isinstance(values, dict):
             return values
         given = cast("dict[str, object]", values)
@@ -270,6 +282,14 @@ class KitSpec(BaseModel):
         except ValidationError as error:
             raise _reworded(error) from None
 
+    def tolerance_for(self, faces: int) -> float:
+        """`tolerance_percent`, or what stands for it on a mesh of so many faces."""
+        if self.tolerance_percent is not None:
+            return self.tolerance_percent
+        if self.method == "pressure":
+            return PRESSURE_TOLERANCE
+        return EXACT_TOLERANCE if faces <= MOST_WALKED_FACES else LARGE_TOLERANCE
+
     def vertex_count(self, genus: int) -> int:
         """Vertices of the simplified mesh: as asked, or from the faces by Euler's formula F = 2V − 4 + 4g.
 
@@ -293,8 +313,10 @@ class KitSpec(BaseModel):
 def _implied_by_palette(given: dict[str, object]) -> dict[str, object]:
     """Method and classes for what is given of palette, like and multisets; what is wrong is found out afterwards."""
     palette, like, multisets = (given.get(name) for name in ("palette", "like", "multisets"))
+    if palette is None and multisets is None and like is None:
+        return {"classes": PRESSURE_CLASSES} if given.get("method") == "pressure" else {}
     if palette is None and multisets is None:
-        return {} if like is None else {"method": "palette"}  # the kit tells the classes once it is read
+        return {"method": "palette"}  # the kit tells the classes once it is read
     if isinstance(multisets, str):
         classes = len({"".join(sorted(word.strip().lower())) for word in multisets.split(",") if word.strip()})
     else:

@@ -15,7 +15,7 @@ from drkid.measure import distance_to_surface
 from drkid.mesh import TriMesh
 from drkid.spec import KitSpec
 
-QUICK = KitSpec(classes=5, max_iterations=3000, tolerance_percent=0.1)
+QUICK = KitSpec(method="pressure", classes=5, max_iterations=3000, tolerance_percent=0.1)
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,8 @@ def coarse() -> TriMesh:
 
 def test_an_icosphere_is_two_classes_at_once():
     sphere = trimesh.creation.icosphere(subdivisions=1)
-    found = decompose(TriMesh(np.asarray(sphere.vertices), np.asarray(sphere.faces)), KitSpec(classes=2))
+    mesh = TriMesh(np.asarray(sphere.vertices), np.asarray(sphere.faces))
+    found = decompose(mesh, KitSpec(method="pressure", classes=2))
     assert found.outcome.status == "converged"
     assert np.bincount(found.face_class).tolist() == [60, 20]
     assert found.face_errors.max() < 1e-12
@@ -70,21 +71,22 @@ def test_a_seed_decides_everything(coarse):
 
 
 def test_it_converges_when_the_tolerance_is_within_reach(coarse):
-    found = decompose(coarse, KitSpec(classes=12, tolerance_percent=6, max_iterations=20000))
+    found = decompose(coarse, KitSpec(method="pressure", classes=12, tolerance_percent=6, max_iterations=20000))
     assert found.outcome.status == "converged"
     assert 100 * found.face_errors.max() / found.mesh.mean_edge <= 6
 
 
 def test_it_says_why_it_stalls(coarse):
-    found = decompose(coarse, KitSpec(classes=2, tolerance_percent=0.01, max_iterations=500))
+    found = decompose(coarse, KitSpec(method="pressure", classes=2, tolerance_percent=0.01, max_iterations=500))
     assert found.outcome.status == "stalled"
     assert "the iterations are used up" in found.outcome.message
     assert found.iterations == 500
 
 
-def test_more_classes_than_faces_are_refused(coarse):
+@pytest.mark.parametrize("method", ["palette", "pressure"])
+def test_more_classes_than_faces_are_refused(coarse, method):
     with pytest.raises(SpecError, match="81 classes cannot be made of 80 faces"):
-        decompose(coarse, KitSpec(classes=81))
+        decompose(coarse, KitSpec(method=method, classes=81))
 
 
 def test_the_driver_tells_how_far_it_is(coarse):

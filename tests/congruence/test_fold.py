@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 from drkid.congruence.fold import (
     FAST_WEIGHT,
     SLOW,
+    descended,
+    descent_from,
     fast_model,
     mode_price,
     relabellings,
-    repair,
     slow_modes,
 )
 from drkid.congruence.framework import Framework
@@ -125,21 +126,33 @@ def test_repair_keeps_the_faces_allowed_and_makes_the_mesh_more_exact(soft, smal
     held, _ = sparse_solve(Framework(small, soft.labels, np.array([0.93, 1.08])), Target(small), 0.02, "scale", 10)
     before = sparse_exact(held, "scale")
     assert before.worst > 1e-4
-    found = repair(held, Target(small), palette, np.random.default_rng(0), after(80), "scale")
+    found = descended(descent_from(held, "scale"), Target(small), palette, np.random.default_rng(0), 80, "scale").best
     assert found.worst < 0.8 * before.worst
     assert (found.labels != held.labels).any()
     assert palette.allowed[tuple(found.labels[found.mesh.face_edges].T)].all()
     np.testing.assert_array_equal(found.mesh.faces, soft.mesh.faces)
 
 
-def test_without_time_it_does_what_newton_does(soft, small):
-    found = repair(soft, Target(small), palette_of_classes(4), np.random.default_rng(0), after(0))
+def test_a_repair_that_was_cut_short_goes_on_where_it_stood(soft, small):
+    palette, rng = palette_of_classes(4), np.random.default_rng(0)
+    descent = descent_from(soft, "scale")
+    worst = [descent.best.worst]
+    for _ in range(6):
+        descent = descended(descent, Target(small), palette, rng, 8, "scale")
+        worst.append(descent.best.worst)
+    assert worst == sorted(worst, reverse=True)
+    assert worst[-1] < 0.8 * worst[0]
+    assert (descent.frame.labels != soft.labels).any()
+
+
+def test_without_trials_it_does_what_newton_does(soft, small):
+    found = descended(descent_from(soft), Target(small), palette_of_classes(4), np.random.default_rng(0), 0).best
     assert found.worst == min(soft.worst, sparse_exact(soft).worst)
     np.testing.assert_array_equal(found.labels, soft.labels)
 
 
 def test_what_newton_can_solve_is_not_relabelled(small):
     near = Framework(small, np.arange(len(small.edges)), small.edge_lengths * (1 + 1e-6))
-    found = repair(near, Target(small), palette_of_classes(4), np.random.default_rng(0), after(2000))
+    found = descended(descent_from(near), Target(small), palette_of_classes(4), np.random.default_rng(0), 2000).best
     assert found.worst < 1e-9
     np.testing.assert_array_equal(found.labels, near.labels)

@@ -103,13 +103,44 @@ def test_other_numbers_of_classes(pebble, classes):
     assert 100 * found.face_errors.max() / found.mesh.mean_edge < 5
 
 
-def test_a_large_mesh_is_annealed_by_patches(pebble, monkeypatch):
-    monkeypatch.setattr(palette_solver, "MOST_DENSE_FACES", 60)
-    found = decompose(pebble, KitSpec(method="palette", classes=4, tolerance_percent=0.001))
-    assert found.iterations == 0
+def test_a_large_mesh_is_annealed_by_patches_and_kept_within_the_tolerance(pebble, monkeypatch):
+    monkeypatch.setattr(palette_solver, "MOST_WALKED_FACES", 60)
+    found = decompose(pebble, KitSpec(method="palette", classes=4, rounds=0, tolerance_percent=5))
+    assert found.iterations == palette_solver.ROUNDS  # the start is always finished
     assert found.mesh.is_closed_manifold
     assert len(found.mesh.faces) == len(pebble.faces)
-    assert 100 * found.face_errors.max() / found.mesh.mean_edge < 8
+    assert found.outcome.status == "converged"
+    assert 100 * found.face_errors.max() / found.mesh.mean_edge < 5
+
+
+def test_hops_on_a_large_mesh_never_make_it_worse(pebble, monkeypatch):
+    monkeypatch.setattr(palette_solver, "MOST_WALKED_FACES", 60)
+    solver = PaletteSolver(KitSpec(method="palette", classes=10, rounds=9, tolerance_percent=5), pebble)
+    state = solver.init(pebble)
+    ranks = []
+    while solver.finished(state) is None:
+        state = solver.step(state)
+        ranks.append(state.found.rank)
+    assert len(ranks) == 9
+    assert ranks[palette_solver.ROUNDS - 1 :] == sorted(ranks[palette_solver.ROUNDS - 1 :], reverse=True)
+
+
+def test_a_mesh_too_large_for_dense_starts_is_made_exact_by_repairing_folds(pebble, monkeypatch):
+    monkeypatch.setattr(palette_solver, "MOST_DENSE_FACES", 60)
+    solver = PaletteSolver(KitSpec(method="palette", classes=4, rounds=12), pebble)
+    state = solver.init(pebble)
+    assert len(state.walks) == palette_solver.BLOCK_STARTS
+    assert state.found.exact or all(walk.descent is not None for walk in state.walks)
+    while solver.finished(state) is None:
+        state = solver.step(state)
+    assert state.found.exact
+
+
+def test_time_grows_with_the_faces_from_ten_seconds():
+    seconds = [palette_solver.default_seconds(faces) for faces in (40, 172, 250, 500, 2000, 5000)]
+    assert seconds[0] == seconds[1] == 10
+    assert seconds[3:] == [60, 60, 150]
+    assert seconds == sorted(seconds)
 
 
 def test_more_classes_than_palettes_have_are_refused(pebble):

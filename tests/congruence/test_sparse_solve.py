@@ -7,7 +7,7 @@ from scipy.sparse import csc_array
 from scipy.spatial.transform import Rotation
 
 from drkid.congruence import levenberg_marquardt, newton
-from drkid.congruence.framework import Framework
+from drkid.congruence.framework import BETA, Framework
 from drkid.congruence.rigidity import rigidity_matrix
 from drkid.congruence.sparse_solve import (
     factorised,
@@ -36,7 +36,7 @@ def target(potato) -> Target:
 
 
 def test_the_matrices_are_the_dense_ones(frame, target):
-    np.testing.assert_allclose(sparse_smoothness(frame.mesh).toarray(), smoothness(frame.mesh, 1.0), atol=1e-14)
+    np.testing.assert_allclose(sparse_smoothness(frame.mesh).toarray(), smoothness(frame.mesh, BETA), atol=1e-14)
     np.testing.assert_array_equal(
         sparse_jacobian(frame).toarray(), rigidity_matrix(frame.mesh.vertices, frame.mesh.edges)
     )

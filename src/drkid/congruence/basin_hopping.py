@@ -1,13 +1,15 @@
 """Walks over exact meshes: hop, judge, and stay or go back (basin hopping, Wales and Doye 1997).
 
-A walk also takes a mesh that is somewhat worse, the less likely the worse it is and the colder the round (Metropolis et
-al. 1953), and one that is not quite exact: the next exact mesh may lie behind it.
+Until there is an exact mesh, walks may repair folds instead. A walk also takes a mesh that is somewhat worse, the less
+likely the worse it is and the colder the round (Metropolis et al. 1953), and one that is not quite exact: behind it may
+lie the next exact mesh.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from drkid.congruence.fold import Descent, descended, descent_from
 from drkid.congruence.framework import Framework
 from drkid.congruence.hop import GLOBAL, LOCAL, OF_ONE, Problem, Ranges, edges_around, hop
 from drkid.congruence.score import Quality, Yardstick
@@ -16,10 +18,13 @@ from drkid.mesh import Ints
 
 EXACT = 1e-9  # largest edge error, of the mean edge, that counts as exact
 LEAST_RATIO = 1.03  # between neighbouring lengths of the palette: nearer ones are one length to a hand
-UNIT_ERROR = 100.0  # a mesh that is not exact is the better, the smaller its largest error
+UNIT_ERROR, RANK_ERROR = 100.0, 1000.0  # what the largest error of a mesh that is not exact adds, to a walk and in rank
 LOCAL_SHARE, FARTHEST_SHARE = 0.85, 0.35  # of the hops; of the local ones at the place of the largest distance
 LOCAL_VERTICES = (7.0, 40.0)  # of a local hop
 HEAT = 0.08  # first temperature of a walk, in units of the score
+TRIALS = 12  # of a fold's repair, in one step of a walk
+REPAIRED_FACES = 200  # from here on hops hardly ever end exactly: what they lead to is repaired
+REPAIR_STEPS = 4  # of a walk, after which such a repair is given up
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +38,17 @@ class Found:
 
     @property
     def rank(self) -> tuple[bool, float]:
-        """For comparison, less being better."""
-        return not self.exact, self.score
+        """For comparison, less being better: where nothing is exact, small errors count for more than to a walk."""
+        return not self.exact, self.score + (RANK_ERROR - UNIT_ERROR) * (0.0 if self.exact else self.frame.worst)
+
+
+@dataclass(frozen=True, eq=False)
+class Walk:
+    """Where a walk stands; with a `descent` it repairs folds for so many `steps` more, without one it hops."""
+
+    found: Found
+    descent: Descent | None = None
+    steps: int = REPAIR_STEPS
 
 
 def judged(frame: Framework, yardstick: Yardstick) -> Found:
@@ -80,3 +94,49 @@ def stays_or_goes(old: Found, new: Found | None, temperature: float, rng: np.ran
         return old
     better = new.score < old.score
     return new if better or rng.random() < np.exp((old.score - new.score) / temperature) else old
+
+
+def walked(
+    walk: Walk, problem: Problem, yardstick: Yardstick, rng: np.random.Generator, temperature: float
+) -> tuple[Walk, Found | None]:
+    """One step of a walk, and the mesh that it met, if any; a repair that breaks the mesh gives way to hops."""
+    try:
+        if walk.descent is not None:
+            return _repaired(walk, walk.descent, problem, yardstick, rng, temperature)
+        new = hopped(walk.found, problem, yardstick, rng)
+        if new is not None and _is_worth_repair(walk.found, new, problem, yardstick):
+            return Walk(walk.found, descent_from(new.frame, problem.freedom)), new
+    except np.linalg.LinAlgError:
+        return Walk(walk.found), None
+    return Walk(stays_or_goes(walk.found, new, temperature, rng)), new
+
+
+def descends(problem: Problem) -> bool:
+    """Can folds be repaired: is the system square, and can labels change alone?"""
+    return problem.square and len(problem.palette.multisets) > 1
+
+
+def _is_worth_repair(old: Found, new: Found, problem: Problem, yardstick: Yardstick) -> bool:
+    large = len(new.frame.labels) >= 3 * REPAIRED_FACES // 2
+    return large and old.exact and not new.exact and descends(problem) and yardstick.score(new.quality) < old.score
+
+
+def _repaired(
+    walk: Walk,
+    descent: Descent,
+    problem: Problem,
+    yardstick: Yardstick,
+    rng: np.random.Generator,
+    temperature: float,
+) -> tuple[Walk, Found]:
+    descent = descended(descent, problem.target, problem.palette, rng, TRIALS, problem.freedom)
+    new = judged(descent.best, yardstick)
+    if not walk.found.exact:  # the first repair: the better of the two, until one is exact
+        return Walk(min(walk.found, new, key=_rank), None if descent.exact else descent), new
+    if descent.exact:
+        return Walk(stays_or_goes(walk.found, new, temperature, rng)), new
+    return Walk(walk.found, descent if walk.steps > 1 else None, walk.steps - 1), new
+
+
+def _rank(found: Found) -> tuple[bool, float]:
+    return found.rank

@@ -52,7 +52,8 @@ def _tidied(solution: Solution, spec: KitSpec) -> Decomposition:
     face_class = np.argsort(order)[labels.ravel()].astype(np.int64)
     lengths = _isosceles(exact[order], best.mesh.mean_edge)
     errors = np.linalg.norm(points - lengths[face_class], axis=1)
-    if 100 * errors.max() / best.mesh.mean_edge > spec.tolerance_percent and solution.outcome.status == "converged":
+    tolerance_percent = spec.tolerance_for(len(best.mesh.faces))
+    if 100 * errors.max() / best.mesh.mean_edge > tolerance_percent and solution.outcome.status == "converged":
         lengths = exact[order]
         errors = np.linalg.norm(points - lengths[face_class], axis=1)
     return Decomposition(

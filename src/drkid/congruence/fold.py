@@ -41,7 +41,7 @@ DAMPING = 0.02  # of the quadratic model: keeps the flexes of the slow modes, wh
 TRIAL_WEIGHTS, TRIAL_ITERATIONS = (0.04,), 1  # on the way from a relabelling to its true merit
 FIRST_LOOK, SETTLE_ITERATIONS = 3, 8
 HOPELESS = 1.1  # a merit above so many times the present one after a first look is not followed further
-MOST_DENSE = 150  # vertices up to which dense matrices are quicker
+MOST_DENSE = 260  # vertices up to which dense matrices are quicker, or as quick and without the lock
 TRIALS = 10  # relabellings tried in vain before the weight is lowered
 LEAST_GAIN = 3e-3  # of the merit, that a relabelling must bring
 EXACT = 1e-9  # largest edge error, of the mean length
@@ -231,13 +231,13 @@ def fast_model(frame: Framework, at: SparseLinearisation, modes: SlowModes, weig
 
 @dataclass(frozen=True, eq=False)
 class Repair:
-    """What stays the same while folds of one connectivity are repaired; `over` is asked before each trial."""
+    """What stays the same while folds of one connectivity are repaired; `counted` is told of each trial."""
 
     target: Target
     palette: Palette
     freedom: Freedom
     moves: Relabellings
-    over: Callable[[], bool]
+    counted: Callable[[], object]
 
     def priced(self, frame: Framework, weight: float) -> tuple[Floats, Floats]:
         """(n,): the modelled change of merit / weight² by each relabelling; and the fast model's `answer`."""
@@ -287,52 +287,93 @@ class Repair:
         spread = float(np.abs(np.partition(prices, TRIALS)[:TRIALS]).mean())
         noisy = prices + heat * spread * rng.standard_normal(len(prices))
         for move in np.argsort(noisy)[:TRIALS].tolist():
-            if self.over() or not np.isfinite(prices[move]):
+            if not np.isfinite(prices[move]):
                 return None
+            self.counted()
             other, value = self.tried(self.relabelled(frame, move, answer), merit, weight)
             if value < (1 - LEAST_GAIN) * merit:
                 return other, value
         return None
 
 
-def repair(
-    frame: Framework,
-    target: Target,
-    palette: Palette,
-    rng: np.random.Generator,
-    over: Callable[[], bool],
-    freedom: Freedom = "all",
-) -> Framework:
-    """Relabel until the mesh is exact or `over` says so: the most exact framework met.
+@dataclass(frozen=True, eq=False)
+class Descent:
+    """Where a repair stands: a soft framework at one of `LEVELS`, and the most exact one met, which is what counts.
 
-    `over` is asked before each trial, so that it can count them or look at a clock. What comes back is never less exact
-    than Newton's method makes what came.
+    `heat` is the noise on the prices, `kicks` how many relabellings may make it worse first.
+    """
+
+    frame: Framework
+    best: Framework
+    level: int = 0
+    heat: float = 0.0
+    kicks: int = 0
+
+    @property
+    def exact(self) -> bool:
+        """Has an exact framework been met?"""
+        return self.best.worst < EXACT
+
+
+def descent_from(frame: Framework, freedom: Freedom = "all") -> Descent:
+    """The beginning of a repair; never less exact than Newton's method makes what came.
 
     Raises:
         numpy.linalg.LinAlgError: the mesh is degenerate from the start.
     """
-    task = Repair(target, palette, freedom, relabellings(frame.mesh, palette.size), over)
-    best, heat, kicks = min(frame, sparse_exact(frame, freedom), key=lambda one: one.worst), 0.0, 0
-    while not task.over() and best.worst >= EXACT:
-        for weight in LEVELS:
-            frame = _descended(task, frame, weight, heat, kicks if weight == LEVELS[0] else 0, rng)
-            solved = sparse_exact(frame, freedom)
-            best = min(best, solved, key=lambda one: one.worst)
-            if best.worst < EXACT or task.over():
-                return best
-        heat, kicks = NOISE, KICKS
-    return best
+    return Descent(frame, min(frame, sparse_exact(frame, freedom), key=lambda one: one.worst))
 
 
-def _descended(
-    task: Repair, frame: Framework, weight: float, heat: float, kicks: int, rng: np.random.Generator
-) -> Framework:
-    """Relabelled at one weight until nothing tried helps, after some kicks that may make it worse."""
-    frame, merit = task.settled(frame, weight)
-    while not task.over():
-        found = task.improved(frame, KICK * merit if kicks > 0 else merit, weight, heat, rng)
-        kicks -= 1
+def descended(
+    descent: Descent,
+    target: Target,
+    palette: Palette,
+    rng: np.random.Generator,
+    trials: int,
+    freedom: Freedom = "all",
+) -> Descent:
+    """Relabel at one level after the other until the mesh is exact or the trials are used up; then it can go on.
+
+    It ends where a relabelling was taken or a level is done, so after a few trials more. From the second round of
+    levels on the prices are noisy and it starts with kicks: it would try the same again otherwise.
+
+    Raises:
+        numpy.linalg.LinAlgError: the mesh has become degenerate.
+    """
+    left = Trials(trials)
+    task = Repair(target, palette, freedom, relabellings(descent.frame.mesh, palette.size), left.count)
+    while not descent.exact and left.number > 0:
+        descent = _relabelled_at(task, descent, left, rng)
+        solved = sparse_exact(descent.frame, freedom)
+        descent = replace(descent, best=min(descent.best, solved, key=lambda one: one.worst))
+    return descent
+
+
+@dataclass
+class Trials:
+    """How many are left."""
+
+    number: int
+
+    def count(self) -> None:
+        """One less."""
+        self.number -= 1
+
+
+def _relabelled_at(task: Repair, descent: Descent, left: Trials, rng: np.random.Generator) -> Descent:
+    """Relabelled at the descent's level until nothing tried helps, then on to the next; or cut short."""
+    weight, kicks = LEVELS[descent.level], descent.kicks
+    frame, merit = task.settled(descent.frame, weight)
+    while left.number > 0:
+        found = task.improved(frame, KICK * merit if kicks > 0 else merit, weight, descent.heat, rng)
+        kicks = max(kicks - 1, 0)
         if found is None:
-            break
+            return _next_level(replace(descent, frame=frame))
         frame, merit = found
-    return frame
+    return replace(descent, frame=frame, kicks=kicks)
+
+
+def _next_level(descent: Descent) -> Descent:
+    if descent.level + 1 < len(LEVELS):
+        return replace(descent, level=descent.level + 1, kicks=0)
+    return replace(descent, level=0, heat=NOISE, kicks=KICKS)

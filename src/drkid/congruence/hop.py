@@ -20,7 +20,7 @@ from drkid.mesh import Ints
 START_WEIGHTS = (1.0, 0.6, 0.4, 0.25)
 START_DAMPING, START_HEAT, START_STEPS_PER_FACE = 0.05, 3.0, 1200
 EXACT_WEIGHTS, EXACT_ITERATIONS = (0.1, 0.03, 0.01), 6
-HOP_EXACT_WEIGHT, HOP_ITERATIONS = 0.03, 6
+HOP_EXACT_WEIGHT, SOFT_ITERATIONS, HOP_ITERATIONS = 0.03, 3, 4
 FLIP_SHARE = 0.3
 REHEATS, REHEAT = 6, 1.7  # where an anneal ends as it began: so often again, so much hotter each time
 
@@ -114,7 +114,7 @@ def hop(
 ) -> Framework:
     """Soften, anneal gently, solve again. `worst` of the result tells whether it is exact."""
     how = ranges.draw(rng)
-    soft, _ = solve(frame, problem.target, how.weight, problem.freedom, 4)
+    soft, _ = solve(frame, problem.target, how.weight, problem.freedom, SOFT_ITERATIONS)
     soft = annealed(soft, problem, how, rng, active)
     soft, _ = solve(soft, problem.target, HOP_EXACT_WEIGHT, problem.freedom, HOP_ITERATIONS)
     return newton.exact(soft, problem.freedom) if problem.square else soft

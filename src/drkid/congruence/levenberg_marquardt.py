@@ -18,9 +18,10 @@ from drkid.mesh import Floats
 Freedom = Literal["all", "scale", "none"]
 """Which of the palette's lengths may change: each of them, all by one factor, or none."""
 
-FIRST_DAMPING = 1e-6
+FIRST_DAMPING, MOST_FIRST_DAMPING = 3e-5, 0.03  # over w²: the weaker the shape holds, the shorter the steps that help
+HARDER, EASIER = 4.0, 0.4  # factors of the damping after a step that failed, and after one that did not
 LEAST_GAIN = 1e-3  # of the merit in one iteration, below which it ends
-TRIALS = 5  # of larger damping, until the merit falls
+TRIALS = 8  # of larger damping, until the merit falls
 
 
 def palette_basis(lengths: Floats, freedom: Freedom) -> Floats:
@@ -40,6 +41,12 @@ def changed_lengths(frame: Framework, freedom: Freedom, step: Floats) -> Floats:
     if freedom == "all":
         return frame.lengths + step
     return frame.lengths * (1 + step[0]) if freedom == "scale" else frame.lengths
+
+
+@njit(cache=True)
+def first_damping(weight: float) -> float:
+    """Damping of the first step at a weight of the shape: with less of it about every other step was refused."""
+    return min(FIRST_DAMPING / max(weight * weight, 1e-300), MOST_FIRST_DAMPING)
 
 
 @njit(cache=True, nogil=True)
@@ -92,7 +99,7 @@ def _damped_least_squares(
         numpy.linalg.LinAlgError: the mesh is degenerate beyond what damping mends.
     """
     slots = np.zeros(len(vertices), np.int64)
-    at, damping = tried_at(vertices, lengths, springs, slots), FIRST_DAMPING
+    at, damping = tried_at(vertices, lengths, springs, slots), first_damping(springs.weight)
     for _ in range(iterations):
         slope, fallen, tried = slope_at(at, springs), False, at
         for _trial in range(TRIALS):
@@ -101,10 +108,10 @@ def _damped_least_squares(
             fallen = tried.merit < at.merit
             if fallen:
                 break
-            damping = max(30 * damping, 1e-4)
+            damping *= HARDER
         if not fallen:
             break
-        gain, at, damping = at.merit - tried.merit, tried, 0.2 * damping
+        gain, at, damping = at.merit - tried.merit, tried, EASIER * damping
         if gain < LEAST_GAIN * at.merit:
             break
     return at.vertices, at.lengths, at.merit

@@ -1,7 +1,8 @@
 """The palette solver: few edge lengths, labelled, annealed and solved until every edge has its length exactly.
 
-Works in units of M_s's mean edge. First a few starts; from the best of them walks set out, which now and then gather at
-the best mesh so far. While none is exact they repair folds between hops. What a round does depends on the seed and its
+Works in units of M_s's mean edge. First a few starts; from the best of them walks set out, which repair folds and hop
+until a mesh is exact, then hop, and now and then gather at the best mesh so far. Large meshes are not made exact: they
+are annealed patch by patch, and no face is off by more than a tolerance. What a round does depends on the seed and its
 number alone, so that the same rounds make the same kit anywhere; the clock only decides how many there are.
 """
 
@@ -10,48 +11,49 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TypeVar
 
 import numpy as np
+import trimesh
 from threadpoolctl import threadpool_limits
 
-from drkid.congruence.basin_hopping import HEAT, Found, hopped, judged, stays_or_goes
-from drkid.congruence.block_anneal import sparse_exactly, sparse_start
-from drkid.congruence.fold import repair
+from drkid.congruence.basin_hopping import HEAT, Found, Walk, descends, judged, walked
+from drkid.congruence.block_anneal import (
+    HOP_BLOCKS,
+    ROUNDS,
+    START_BLOCKS,
+    TOLERANCE,
+    sparse_exactly,
+    sparse_hop,
+    sparse_round,
+    sparse_start,
+)
+from drkid.congruence.fold import Descent, descended, descent_from
 from drkid.congruence.framework import Framework
 from drkid.congruence.given_palette import palette_of
 from drkid.congruence.hop import Problem, exactly, start
 from drkid.congruence.labelling import first_labels
 from drkid.congruence.levenberg_marquardt import Freedom
-from drkid.congruence.palette import Palette
+from drkid.congruence.palette import Palette, palette_of_classes
 from drkid.congruence.score import Yardstick
 from drkid.congruence.solver import Candidate
 from drkid.congruence.target import Target
 from drkid.congruence.triangle_space import ascending_lengths, clustering_error
 from drkid.kit import Convergence, Outcome
 from drkid.mesh import TriMesh, read_only
-from drkid.spec import KitSpec
+from drkid.spec import DEFAULT_FACES, MOST_WALKED_FACES, KitSpec
 
 START_RATIOS = (1.17, 1.15, 1.19)  # of two lengths, tried in turn
+MOST_DENSE_FACES = 300  # beyond, starts are annealed by patches
 STARTS, WALKS = 6, 4
-ROUNDS_PER_GATHERING = 30  # of the walks at the best mesh so far; until then they grow colder
-MOST_DENSE_FACES = 800  # beyond, the dense model takes too long: patches and sparse solves, and no hops
-SECONDS_PER_FACE = 0.06
-MOST_TRIALS = 120  # of a fold's repair in one round
+BLOCK_STARTS = 2  # beyond MOST_DENSE_FACES, each with a walk
+ROUNDS_PER_GATHERING = 15  # of the walks at the best mesh so far; until then they grow colder
+UNDER_TOLERANCE = 0.9  # what is aimed at, of the tolerance asked for
+LEAST_SECONDS, MOST_SECONDS = 10.0, 60.0  # for small meshes, and for those of 500 faces
+SECONDS_OF_LARGE = 0.03  # a face
+ALMOST = 0.99  # of a search that time would end before its start is finished
 R = TypeVar("R")
-
-
-@dataclass
-class Trials:
-    """Counts what a repair asks before each trial: the work of a round is then the same on any machine."""
-
-    count: int = 0
-
-    def __call__(self) -> bool:
-        """Whether the trials of this round are used up."""
-        self.count += 1
-        return self.count > MOST_TRIALS
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,15 +64,10 @@ class PaletteState:
     problem: Problem
     yardstick: Yardstick
     found: Found
-    walks: tuple[Found, ...]
+    walks: tuple[Walk, ...]
     round: int
     began: float
     history: tuple[Convergence, ...]
-
-    @property
-    def large(self) -> bool:
-        """Too large for the dense model, and so for hops."""
-        return len(self.found.frame.mesh.faces) > MOST_DENSE_FACES
 
     @property
     def iteration(self) -> int:
@@ -100,59 +97,89 @@ class PaletteSolver:
     surface: TriMesh
 
     def init(self, mesh: TriMesh) -> PaletteState:
-        """The starts, in parallel, and the best of them.
+        """The starts, in parallel, and the best of them; of a large mesh no more than first labels.
 
         Raises:
             SpecError: too many classes, or no labelling of this mesh has only allowed triangles.
         """
-        began, scale = time.monotonic(), mesh.mean_edge
+        scale, large = mesh.mean_edge, _is_large(mesh)
         unit = mesh.scaled(1 / scale)
-        large = len(mesh.faces) > MOST_DENSE_FACES
+        _compile()
+        began = time.monotonic()
         with threadpool_limits(1):
             palette = palette_of(self.spec, unit, np.random.default_rng([self.spec.seed, 0, STARTS]), large=large)
         free: Freedom = "scale" if palette.held else "all"
-        problem = Problem(
-            Target(self.surface.scaled(1 / scale)),
-            palette,
-            free if mesh.genus == 0 else "none",
-            mesh.genus == 0,
-        )
+        target = Target(self.surface.scaled(1 / scale))
+        problem = Problem(target, palette, free if mesh.genus == 0 else "none", mesh.genus == 0)
         yardstick = Yardstick(unit, self.spec)
+        dense = len(mesh.faces) <= MOST_DENSE_FACES
 
-        def begin(number: int) -> Found:
+        def begin(number: int) -> Walk:
             rng = np.random.default_rng([self.spec.seed, 0, number])
-            first = first_frame(unit, problem.palette, number, rng)
+            first = first_frame(unit, palette, number, rng)
             if large:
-                return _large_start(first, problem, yardstick, rng)
-            return judged(exactly(start(first, problem, rng), problem), yardstick)
+                return Walk(judged(first, yardstick))
+            if dense:
+                soft = start(first, problem, rng)
+                found = judged(exactly(soft, problem), yardstick)
+            else:
+                soft = sparse_start(first, target, palette, problem.freedom, rng)
+                found = judged(sparse_exactly(soft, target, problem.freedom, square=problem.square), yardstick)
+            repairs = descends(problem) and (not dense or number % 2 == 0)
+            return Walk(found, descent_from(soft, problem.freedom) if repairs else None)
 
         with threadpool_limits(1):
-            results = _in_parallel([lambda n=n: begin(n) for n in range(1 if large else STARTS)])
-        walks = sorted(results, key=_rank)[:WALKS]
-        walks += walks[: WALKS - len(walks)]
-        state = PaletteState(scale, problem, yardstick, walks[0], tuple(walks), 0, began, ())
+            count = 1 if large else STARTS if dense else BLOCK_STARTS
+            walks = sorted(_in_parallel([lambda n=n: begin(n) for n in range(count)]), key=_rank_of_walk)[:WALKS]
+        state = PaletteState(scale, problem, yardstick, walks[0].found, tuple(walks), 0, began, ())
         return replace(state, history=(_recorded(state),))
 
     def step(self, state: PaletteState) -> PaletteState:
-        """One round: a hop, or the repair of a fold, in each walk; the walks gather at the best mesh now and then."""
-        phase = state.round % ROUNDS_PER_GATHERING
-        gathers = phase == 0 and state.round > 0 and state.found.exact
-        walks = (state.found,) * WALKS if gathers else state.walks
-
-        def walk(number: int) -> tuple[Found, Found | None]:
-            rng = np.random.default_rng([self.spec.seed, state.round + 1, number])
-            old = walks[number]
-            if not state.found.exact and (number + state.round) % 2 == 0:
-                new = _repaired(old, state, rng)
-            else:
-                new = hopped(old, state.problem, state.yardstick, rng)
-            return stays_or_goes(old, new, HEAT * (1 - phase / ROUNDS_PER_GATHERING), rng), new
-
+        """One round: a step of each walk, or a weight or a hop of a large mesh."""
         with threadpool_limits(1):
-            results = _in_parallel([lambda n=n: walk(n) for n in range(WALKS)])
-        best = min([state.found, *(new for _, new in results if new is not None)], key=_rank)
-        state = replace(state, found=best, walks=tuple(stays for stays, _ in results), round=state.round + 1)
-        return replace(state, history=(_recorded(state),))
+            after = self._large_step(state) if _is_large(state.found.frame.mesh) else self._walked(state)
+        after = replace(after, round=state.round + 1)
+        return replace(after, history=(_recorded(after),))
+
+    def _walked(self, state: PaletteState) -> PaletteState:
+        phase = state.round % ROUNDS_PER_GATHERING
+        gathers = state.found.exact and phase == 0
+        walks = tuple(Walk(state.found) for _ in state.walks) if gathers else state.walks
+        temperature = HEAT * (1 - phase / ROUNDS_PER_GATHERING)
+
+        def step(number: int) -> tuple[Walk, Found | None]:
+            rng = np.random.default_rng([self.spec.seed, state.round + 1, number])
+            return walked(walks[number], state.problem, state.yardstick, rng, temperature)
+
+        results = _in_parallel([lambda n=n: step(n) for n in range(len(walks))])
+        met = [new for _, new in results if new is not None]
+        found = min([state.found, *met], key=_rank)
+        if found.exact and not state.found.exact:  # the first one: all go on from there
+            return replace(state, found=found, walks=(Walk(found),) * len(walks))
+        return replace(state, found=found, walks=tuple(walk for walk, _ in results))
+
+    def _large_step(self, state: PaletteState) -> PaletteState:
+        """A weight of the start, the last with the true solve; afterwards hops, of which better ones stay."""
+        rng, problem, workers = (
+            np.random.default_rng([self.spec.seed, state.round + 1]),
+            state.problem,
+            os.cpu_count() or 1,
+        )
+        target, palette, freedom, frame = problem.target, problem.palette, problem.freedom, state.walks[0].found.frame
+        if state.round < ROUNDS:
+            blocks = replace(START_BLOCKS, workers=workers)
+            frame = sparse_round(frame, state.round, target, palette, freedom, rng, blocks)
+        else:
+            blocks = replace(HOP_BLOCKS, workers=workers)
+            frame = sparse_hop(frame, target, palette, freedom, rng, blocks)
+        if state.round >= ROUNDS - 1:
+            wanted = UNDER_TOLERANCE / 100 * self.spec.tolerance_for(len(frame.mesh.faces))
+            square = problem.square and state.round < ROUNDS
+            frame = sparse_exactly(frame, target, freedom, square=square, tolerance=min(TOLERANCE, wanted))
+        found = judged(frame, state.yardstick)
+        if state.round >= ROUNDS:
+            found = min(found, state.found, key=_rank)
+        return replace(state, found=found, walks=(Walk(found),))
 
     def finished(self, state: PaletteState) -> Outcome | None:
         """When the rounds or the seconds are used up."""
@@ -167,9 +194,10 @@ class PaletteSolver:
         after = f"after {state.round} rounds in {time.monotonic() - state.began:.1f} s{why}"
         if state.found.exact:
             return Outcome("converged", f"exact: largest error {percent:.1g} % {after}")
-        status = "converged" if percent <= self.spec.tolerance_percent else "stalled"
-        more = "--classes" if state.large else "--seconds or --classes"
-        return Outcome(status, f"not exact: largest error {percent:.3g} % {after}; more {more} may help")
+        status = "converged" if percent <= self.spec.tolerance_for(len(state.best.mesh.faces)) else "stalled"
+        return Outcome(
+            status, f"not exact: largest error {percent:.3g} % {after}; more --seconds or --classes may help"
+        )
 
     def told(self, state: PaletteState) -> str:
         """Exact or not, T, d_H and the 95th percentile of the dihedrals."""
@@ -181,13 +209,37 @@ class PaletteSolver:
         )
 
     def fraction(self, state: PaletteState) -> float:
-        """Rounds or seconds used, of those given; a large mesh is not hopped on."""
-        if state.large:
-            return 1.0
+        """Rounds or seconds used, of those given; the start of a large mesh is always finished."""
+        started = state.round / ROUNDS if _is_large(state.found.frame.mesh) else 1.0
         if self.spec.rounds is not None:
-            return state.round / self.spec.rounds
-        seconds = self.spec.seconds or max(10.0, SECONDS_PER_FACE * len(state.best.mesh.faces))
-        return (time.monotonic() - state.began) / seconds
+            used = state.round / self.spec.rounds if self.spec.rounds else 1.0
+        else:
+            seconds = self.spec.seconds or default_seconds(len(state.found.frame.mesh.faces))
+            used = (time.monotonic() - state.began) / seconds
+        return used if started >= 1 else min(max(used, started), ALMOST)
+
+
+@cache
+def _compile() -> None:
+    """Compile, or load what is compiled, before the clock runs: the first search of an installation is then no worse."""
+    ball = trimesh.creation.icosahedron()
+    mesh = TriMesh(np.asarray(ball.vertices, np.float64), np.asarray(ball.faces, np.int64))
+    problem = Problem(Target(mesh), palette_of_classes(2), "all", square=True)
+    rng = np.random.default_rng(0)
+    with threadpool_limits(1):
+        soft = start(first_frame(mesh, problem.palette, 0, rng), problem, rng)
+        descended(Descent(soft, soft), problem.target, problem.palette, rng, 1)
+        judged(exactly(soft, problem), Yardstick(mesh, KitSpec()))
+
+
+def default_seconds(faces: int) -> float:
+    """Time for a mesh of so many faces where none is given."""
+    share = np.clip((faces - DEFAULT_FACES) / (500 - DEFAULT_FACES), 0, 1)
+    return max(LEAST_SECONDS + share * (MOST_SECONDS - LEAST_SECONDS), SECONDS_OF_LARGE * faces)
+
+
+def _is_large(mesh: TriMesh) -> bool:
+    return len(mesh.faces) > MOST_WALKED_FACES
 
 
 def first_frame(mesh: TriMesh, palette: Palette, number: int, rng: np.random.Generator) -> Framework:
@@ -203,25 +255,12 @@ def first_frame(mesh: TriMesh, palette: Palette, number: int, rng: np.random.Gen
     return Framework(mesh, labels, palette.lengths(mesh.mean_edge, labels))
 
 
-def _large_start(first: Framework, problem: Problem, yardstick: Yardstick, rng: np.random.Generator) -> Found:
-    """A mesh too large for the dense model: annealed by patches, solved sparsely."""
-    workers = os.cpu_count() or 1
-    soft = sparse_start(first, problem.target, problem.palette, problem.freedom, rng, workers=workers)
-    return judged(sparse_exactly(soft, problem.target, problem.freedom, square=problem.square), yardstick)
-
-
-def _repaired(found: Found, state: PaletteState, rng: np.random.Generator) -> Found | None:
-    """One walk's mesh with some of its folds repaired; None where that broke it."""
-    problem = state.problem
-    try:
-        frame = repair(found.frame, problem.target, problem.palette, rng, Trials(), problem.freedom)
-    except np.linalg.LinAlgError:
-        return None
-    return judged(frame, state.yardstick)
-
-
 def _rank(found: Found) -> tuple[bool, float]:
     return found.rank
+
+
+def _rank_of_walk(walk: Walk) -> tuple[bool, float]:
+    return walk.found.rank
 
 
 def _recorded(state: PaletteState) -> Convergence:

@@ -75,7 +75,7 @@ class PressureSolver:
             state.reference.corners,
             nearby,
             self.spec.limit * state.reference.mean_edge,
-            self.spec.tolerance_percent / 100 * mean_edge,
+            self._tolerance_percent(state) / 100 * mean_edge,
             count,
         )
         iteration = state.iteration + len(history)
@@ -93,7 +93,8 @@ class PressureSolver:
     def finished(self, state: PressureState) -> Outcome | None:
         """Converged at the tolerance; stalled where nothing improves any more or the iterations are used up."""
         percent = 100 * state.best.error / state.best.mesh.mean_edge
-        if percent <= self.spec.tolerance_percent:
+        wanted = self._tolerance_percent(state)
+        if percent <= wanted:
             return Outcome("converged", f"largest error {percent:.3g} % after {state.iteration} iterations")
         if state.iteration >= self.spec.max_iterations:
             why = "the iterations are used up"
@@ -103,9 +104,11 @@ class PressureSolver:
             return None
         return Outcome(
             "stalled",
-            f"largest error {percent:.3g} % instead of {self.spec.tolerance_percent:g} % after {state.iteration} "
-            f"iterations: {why}",
+            f"largest error {percent:.3g} % instead of {wanted:g} % after {state.iteration} iterations: {why}",
         )
+
+    def _tolerance_percent(self, state: PressureState) -> float:
+        return self.spec.tolerance_for(len(state.mesh.faces))
 
     def interrupted(self, state: PressureState) -> None:  # noqa: ARG002 — the protocol's signature
         """A mesh half-way is no answer: nothing is kept."""

@@ -15,10 +15,12 @@ from scipy.sparse.linalg import splu
 
 from drkid.congruence.framework import BETA, Framework
 from drkid.congruence.levenberg_marquardt import (
-    FIRST_DAMPING,
+    EASIER,
+    HARDER,
     LEAST_GAIN,
     Freedom,
     changed_lengths,
+    first_damping,
     palette_columns,
 )
 from drkid.congruence.newton import EXACT, ITERATIONS, LEAST_FACTOR, LONGEST_STEP, PALETTE_SHARE, PATIENCE
@@ -155,20 +157,20 @@ def sparse_solve(
         numpy.linalg.LinAlgError: the mesh is degenerate beyond what damping mends.
     """
     stiffness = sparse_smoothness(frame.mesh, beta)
-    at, damping = sparse_linearised(frame, target, weight, stiffness, misfit), FIRST_DAMPING
+    at, damping = sparse_linearised(frame, target, weight, stiffness, misfit), first_damping(weight)
     for _ in range(iterations):
         for _ in range(TRIALS):
             tried = _damped_step(frame, at, freedom, damping)
             value = sparse_merit(tried, target.offsets(tried.mesh.vertices)[0], stiffness, weight, misfit)
             if value < at.merit:
                 break
-            damping = max(30 * damping, 1e-4)
+            damping *= HARDER
         else:
             break
         gain, frame = at.merit - value, tried
         if gain < LEAST_GAIN * value:
             return frame, value
-        at, damping = sparse_linearised(frame, target, weight, stiffness, misfit), 0.2 * damping
+        at, damping = sparse_linearised(frame, target, weight, stiffness, misfit), EASIER * damping
     return frame, at.merit
 
 
