@@ -227,10 +227,8 @@ def paper() -> None:
     """The paper's own rows, for comparison."""
     for row in tomllib.loads((HERE / "paper_table.toml").read_text())["row"]:
         near = "{:.2f}/{:.2f}".format(*row["simplified_assembled_percent"])
-        print(
-            f"paper {row['model']:<4} F {row['faces_final']:<5} k {row['classes']:<3} T {row['tolerance_percent']:.2f} % "
-            f" d_H(Ms,Mf) {near}  {row['seconds']:.0f} s"
-        )
+        size = f"F {row['faces_final']:<5} k {row['classes']:<3} T {row['tolerance_percent']:.2f} %"
+        print(f"paper {row['model']:<4} {size}  d_H(Ms,Mf) {near}  {row['seconds']:.0f} s")
 
 
 def names(text: str) -> list[int]:

@@ -96,18 +96,21 @@ def test_the_price_of_a_relabelling_is_what_solving_the_frozen_model_again_gives
 
 def test_annealing_changes_only_the_core_and_leaves_a_sound_allowed_mesh(frame, linearised, palette):
     patch = disk(frame)
-    local = local_model(frame, linearised, patch, DAMPING)
-    annealed_patch(local, frame.lengths, palette.allowed.copy(), 30.0, 100, np.random.default_rng(0))
-    found = put_back(frame, [local])
-    assert found.mesh.is_closed_manifold
-    assert found.mesh.genus == 0
-    assert palette.allowed[tuple(found.labels[found.mesh.face_edges].T)].all()
+    core = set(patch.moving[: patch.core].tolist())
 
     def labelled(one: Framework) -> set[tuple[int, int, int]]:
         return {(int(a), int(b), int(n)) for (a, b), n in zip(one.mesh.edges, one.labels, strict=True)}
 
-    changed = labelled(found) ^ labelled(frame)
-    core = set(patch.moving[: patch.core].tolist())
-    assert changed
-    assert all(a in core and b in core for a, b, _ in changed)
-    assert len(set(map(tuple, found.mesh.edges.tolist())) - set(map(tuple, frame.mesh.edges.tolist()))) > 0
+    flipped = 0
+    for seed in range(4):
+        local = local_model(frame, linearised, patch, DAMPING)
+        annealed_patch(local, frame.lengths, palette.allowed.copy(), 30.0, 100, np.random.default_rng(seed))
+        found = put_back(frame, [local])
+        assert found.mesh.is_closed_manifold
+        assert found.mesh.genus == 0
+        assert palette.allowed[tuple(found.labels[found.mesh.face_edges].T)].all()
+        changed = labelled(found) ^ labelled(frame)
+        assert changed
+        assert all(a in core and b in core for a, b, _ in changed)
+        flipped += len(set(map(tuple, found.mesh.edges.tolist())) - set(map(tuple, frame.mesh.edges.tolist())))
+    assert flipped > 0

@@ -221,7 +221,7 @@ class PaletteSolver:
 
 @cache
 def _compile() -> None:
-    """Compile, or load what is compiled, before the clock runs: the first search of an installation is then no worse."""
+    """Compile, or load what is compiled, before the clock runs: the first search ever is then no worse."""
     ball = trimesh.creation.icosahedron()
     mesh = TriMesh(np.asarray(ball.vertices, np.float64), np.asarray(ball.faces, np.int64))
     problem = Problem(Target(mesh), palette_of_classes(2), "all", square=True)
