@@ -15,6 +15,7 @@ import re
 import subprocess
 import sys
 import tempfile
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from statistics import mean, median
@@ -26,6 +27,10 @@ REPOSITORY = DOCS.parent
 RESULTS = REPOSITORY / "benchmarks" / "results"
 EXACT_PERCENT = 1e-6  # of the mean edge: what is left is rounding
 PAIRS = ("surface_simplified_percent", "simplified_assembled_percent", "surface_assembled_percent")
+PAPER = REPOSITORY / "benchmarks" / "paper_table.toml"
+PAPER_MODELS, NEAR_FACES = ("M4", "M1"), 10  # beside which numbers of faces they stand
+SHAPE_FACES, SHAPE_PALETTES = 172, (2, "universal")
+EXACTNESS = ("exact", "first s", "T %", "d_H(M_s, M_f)", "d_H(M_i, M_f)")
 SHAPES = {
     "urocell_mito_bean.nii.gz": "mitochondrion",
     "cells3d_nuclei_labels.ome.tif": "nucleus",
@@ -88,22 +93,75 @@ def _figures(row: dict) -> list[str]:
 
 
 def congruence() -> str:
-    """The palette solver and the pressure solver on the same meshes."""
-    rows = [
-        [
-            r["shape"].split(".")[0].replace("_", " "),
-            f"{r['method']}, k = {r['classes']}",
-            "exact" if r["exact"] else f"{r['error_max_percent']:.2g}",
-            "{:.2f} / {:.2f}".format(*r["simplified_assembled_percent"]),
-            "{:.2f} / {:.2f}".format(*r["surface_assembled_percent"]),
-            "{:.0f} ({:.0f})".format(*r["dihedral_p95_degrees"]),
-            "{:.0f} ({:.0f})".format(*r["concave_percent"]),
-            f"{r['seconds']:.1f}",
-        ]
-        for r in json.loads((RESULTS / "congruence.json").read_text())
-    ]
-    head = ["shape", "solver", "T %", "d_H(M_s, M_f)", "d_H(M_i, M_f)", "dihedral p95 °", "concave %", "s"]
-    return table(head, rows)
+    """The palette solver by faces and palette, beside the pressure solver and the paper; and shape by shape."""
+    rows = json.loads((RESULTS / "congruence.json").read_text())
+    return f"{_by_palette(rows)}\n\nShape by shape at {SHAPE_FACES} faces, medians over seeds:\n\n{_by_shape(rows)}"
+
+
+def _by_palette(rows: list[dict]) -> str:
+    printed = []
+    papers = [row for row in tomllib.loads(PAPER.read_text())["row"] if row["model"] in PAPER_MODELS]
+    for faces in sorted({r["faces"] for r in rows}):
+        for palette in sorted(
+            {r["palette"] for r in rows if r["faces"] == faces}, key=lambda p: (isinstance(p, str), p)
+        ):
+            some = [r for r in rows if (r["faces"], r["palette"]) == (faces, palette)]
+            beside = [r["pressure"] for r in some if "pressure" in r]
+            excess = median(r["dihedral"][1] - r["simplified_dihedral"][1] for r in some)
+            printed.append(
+                [
+                    str(faces),
+                    str(palette),
+                    *_exactness(some),
+                    f"{excess:+.0f}",
+                    _median([r["seconds"] for r in some], ".0f"),
+                    _median([r["peak_memory_mb"] for r in some], ".0f"),
+                    _median([r["error_max_percent"] for r in beside], ".2g"),
+                    _median([r["seconds"] for r in beside], ".1f"),
+                    _median([r["ratio"] for r in beside], ".2g"),
+                ]
+            )
+        for paper in [row for row in papers if abs(row["faces_final"] - faces) <= NEAR_FACES]:
+            distances = [f"{paper[name][0]:.2f} / {paper[name][1]:.2f}" for name in PAIRS[1:]]
+            own = [str(paper["faces_final"]), f"{paper['classes']}, paper's {paper['model']}"]
+            printed.append(
+                [*own, "–", "–", f"{paper['tolerance_percent']}", *distances, "–", f"{paper['seconds']}", *"––––"]
+            )
+    head = ["faces", "k", *EXACTNESS, "p95 °", "s", "MB", "pressure: T %", "s", "ratio"]
+    return table(head, printed)
+
+
+def _by_shape(rows: list[dict]) -> str:
+    small = [r for r in rows if r["faces"] == SHAPE_FACES and r["palette"] in SHAPE_PALETTES]
+    printed = []
+    for shape in dict.fromkeys(r["shape"] for r in small):
+        for palette in SHAPE_PALETTES:
+            some = [r for r in small if (r["shape"], r["palette"]) == (shape, palette)]
+            if some:
+                angles = [
+                    f"{median(r['dihedral'][i] for r in some):.0f} ({some[0]['simplified_dihedral'][i]:.0f})"
+                    for i in (1, 2)
+                ]
+                printed.append([shape.split(".")[0].replace("_", " "), str(palette), *_exactness(some), *angles])
+    return table(["shape", "k", *EXACTNESS, "p95 °", "concave %"], printed)
+
+
+def _exactness(rows: list[dict]) -> list[str]:
+    """How many are exact and when, T, and the two distances: the columns `EXACTNESS`."""
+    errors = [r["error_max_percent"] for r in rows]
+    exact, middle = sum(r["exact"] for r in rows), median(errors)
+    tolerance = "exact" if middle < EXACT_PERCENT and 2 * exact >= len(rows) else f"{middle:.2g}"
+    if exact < len(rows) > 1:
+        tolerance += f" ({max(errors):.2g})"
+    distances = ["{:.2f} / {:.2f}".format(*(median(r[name][i] for r in rows) for i in (0, 1))) for name in PAIRS[1:]]
+    first = _median([r["first_exact_seconds"] for r in rows], ".1f")
+    return [f"{exact} of {len(rows)}", first, tolerance, *distances]
+
+
+def _median(values: list[float | None], form: str) -> str:
+    """Of those that there are."""
+    there = [value for value in values if value is not None]
+    return format(median(there), form) if there else "–"
 
 
 def choices() -> str:

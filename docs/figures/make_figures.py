@@ -406,7 +406,7 @@ def draw_curve(axis: Axes, height: float) -> None:
         axis.plot(*point, "o", color="0.1", ms=5)
         axis.annotate(name, point, place, textcoords="offset points", fontsize=9)
     axis.text(-0.33, 0.2, "solvable: $σ^2 + 4 S c ≥ 0$", fontsize=9, ha="center")
-    axis.text(-0.33, -0.23, "not solvable: other labels, or none", fontsize=9, ha="center")
+    axis.text(-0.33, -0.23, "not solvable but by other labels", fontsize=9, ha="center")
     axis.set(
         xlabel="$t$: movement along the flex", ylabel="$c$: change of lengths", xlim=t[[0, -1]], ylim=(-0.25, 0.25)
     )
@@ -438,7 +438,7 @@ def time_to_quality(results: Path = RESULTS / "congruence.json") -> None:
         left.fill_between(seconds[begun], low, high, color=tint, alpha=0.15, lw=0)
         left.plot(seconds[begun], np.where(done, np.nan, middle), color=tint, ls=":", lw=1.4)
         left.plot(seconds[begun], np.where(done, middle, np.nan), color=tint, label=name)
-        right.step(seconds, 100 * exact.mean(axis=0), color=tint, where="post", label=f"{name}, {len(curves)} runs")
+        right.step(seconds, 100 * exact.mean(axis=0), color=tint, where="post", label=f"{name}, n = {len(curves)}")
     left.set(xlabel="s", ylabel="mean $d_H(M_s, M_f)$, % of the diagonal", ylim=(0, None))
     right.set(xlabel="s", ylabel="exact, % of the runs", ylim=(0, 103))
     for axis, place in ((left, "lower right"), (right, "lower right")):

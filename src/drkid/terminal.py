@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from drkid.verification import Verification
 
 MOST_ROWS = 30  # of labels or components that a table shows
+EXACT_PERCENT = 1e-6  # of the mean edge: what is left is rounding
 
 
 def _out() -> Console:
@@ -92,8 +93,7 @@ def show_kit(kit: "Kit", folder: "Path", seconds: float) -> None:
     distance, outcome = metrics.surface_assembled, kit.decomposition.outcome
     rows = {
         "pieces": f"{metrics.pieces} in {metrics.classes} classes, {metrics.unique_piece_parts} moulds",
-        "error": f"T {metrics.error_max_percent:.3g} % (largest), {metrics.error_mean_percent:.3g} % mean, "
-        "of the mean edge",
+        "error": _error(metrics.error_max_percent, metrics.error_mean_percent),
         "d_H": f"{distance.mean_percent:.2g} % mean, {distance.max_percent:.2g} % max from the input, of its box",
         "size": f"{size} mm, edges {metrics.mean_edge:.1f} mm, {kit.part_set.dimensions.thickness_mm:g} mm thick",
         "grooves": f"{metrics.groove_mean_mm:.2g} mm mean, {metrics.groove_max_mm:.2g} mm max",
@@ -116,6 +116,12 @@ def _rigidity(found: "Rigidity | None", mean_edge_mm: float) -> str:
             f" behind {found.barrier_percent / 100 * mean_edge_mm:.2g} mm of play"
         )
     return text
+
+
+def _error(largest_percent: float, mean_percent: float) -> str:
+    if largest_percent < EXACT_PERCENT:
+        return f"exact: largest {largest_percent:.1g} % of the mean edge"
+    return f"T {largest_percent:.3g} % (largest), {mean_percent:.3g} % mean, of the mean edge"
 
 
 def show_verification(found: "Verification") -> None:

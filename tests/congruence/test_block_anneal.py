@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from labelled_shapes import SOFT_WEIGHT, softly_solved
 
 from drkid.congruence.block_anneal import (
     BETA_OF_LARGE,
@@ -15,13 +16,12 @@ from drkid.congruence.block_anneal import (
     sparse_start,
 )
 from drkid.congruence.framework import Framework
-from drkid.congruence.labelling import nearest_labels, repaired
 from drkid.congruence.palette import Palette, palette_of_classes
 from drkid.congruence.penalty import NEAR, largest_error
-from drkid.congruence.sparse_solve import sparse_linearised, sparse_smoothness, sparse_solve
+from drkid.congruence.sparse_solve import sparse_linearised, sparse_smoothness
 from drkid.congruence.target import Target
 
-WEIGHT = 0.4
+WEIGHT = SOFT_WEIGHT
 QUICK = Blocks(steps_per_edge=100, core=25, moving=50, packings=3)
 
 
@@ -36,13 +36,9 @@ def target(potato) -> Target:
 
 
 @pytest.fixture(scope="module")
-def frame(target, palette) -> Framework:
+def frame(target) -> Framework:
     """The potato in units of its mean edge, labelled and softly solved."""
-    mesh = target.mesh
-    lengths = np.array([0.93, 1.08])
-    labels = repaired(mesh, nearest_labels(mesh, lengths), palette, lengths, np.random.default_rng(0))
-    assert labels is not None
-    return sparse_solve(Framework(mesh, labels, lengths), target, WEIGHT, "scale", 4)[0]
+    return softly_solved(target)
 
 
 def merit(frame: Framework, target: Target) -> float:

@@ -3,7 +3,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-import trimesh
+from labelled_shapes import PEBBLE_LENGTHS, ellipsoid, labelled_pebble
 from plain_linearisation import plain_linearised
 from quadratic_problem import pebble, small_ring
 
@@ -17,24 +17,18 @@ from drkid.congruence.levenberg_marquardt import (
 )
 from drkid.congruence.rigidity import rigidity_matrix
 from drkid.congruence.target import Target
-from drkid.mesh import TriMesh
 
 FREEDOMS = ("all", "scale", "none")
-LENGTHS = np.array([0.95, 1.06])
 
 
 @pytest.fixture(scope="module")
 def frame():
-    mesh = pebble()
-    return Framework(mesh, np.random.default_rng(1).integers(2, size=len(mesh.edges)), LENGTHS)
+    return labelled_pebble()
 
 
 @pytest.fixture(scope="module")
 def target():
-    """A smooth ellipsoid that the pebble was roughly made on."""
-    sphere = trimesh.creation.icosphere(subdivisions=4)
-    size = pebble().extents / 2 / [1.3, 1.0, 0.9]
-    return Target(TriMesh(sphere.vertices * [1.3, 1.0, 0.9] * size.mean(), sphere.faces))
+    return ellipsoid()
 
 
 @pytest.mark.parametrize("freedom", FREEDOMS)
@@ -45,7 +39,7 @@ def test_palette_columns_are_the_derivative_of_the_wanted_lengths(frame, freedom
     lengths = changed_lengths(frame, freedom, step)
     np.testing.assert_allclose(lengths[frame.labels], frame.wanted + columns @ step, rtol=1e-13)
     if freedom == "scale":
-        assert lengths[1] / lengths[0] == pytest.approx(LENGTHS[1] / LENGTHS[0])
+        assert lengths[1] / lengths[0] == pytest.approx(PEBBLE_LENGTHS[1] / PEBBLE_LENGTHS[0])
 
 
 @pytest.mark.parametrize("freedom", FREEDOMS)
@@ -96,7 +90,7 @@ def test_the_merit_never_rises(frame, target, freedom, weight):
 def test_wild_starts_do_not_raise_it_either(frame, target, seed):
     """Far from the solution full steps overshoot, and damping has to grow."""
     noise = 0.8 * np.random.default_rng(seed).normal(size=frame.mesh.vertices.shape)
-    start = frame.moved(frame.mesh.vertices + noise, LENGTHS)
+    start = frame.moved(frame.mesh.vertices + noise, PEBBLE_LENGTHS)
     found, value = solve(start, target, 0.1, "all")
     assert value < plain_linearised(start, target, 0.1).merit
     assert np.isfinite(found.mesh.vertices).all()
@@ -136,7 +130,7 @@ def test_a_mesh_with_an_edge_without_length_is_refused(frame, target):
     vertices = frame.mesh.vertices.copy()
     vertices[frame.mesh.edges[5, 1]] = vertices[frame.mesh.edges[5, 0]]
     with pytest.raises(np.linalg.LinAlgError, match="no length"):
-        solve(frame.moved(vertices, LENGTHS), target, 0.3)
+        solve(frame.moved(vertices, PEBBLE_LENGTHS), target, 0.3)
 
 
 @pytest.mark.parametrize("weight", [0.0, 0.3])
@@ -144,7 +138,7 @@ def test_a_start_that_is_not_finite_is_refused(frame, target, weight):
     vertices = frame.mesh.vertices.copy()
     vertices[3] = np.nan
     with pytest.raises(np.linalg.LinAlgError, match="not finite"):
-        solve(frame.moved(vertices, LENGTHS), target, weight)
+        solve(frame.moved(vertices, PEBBLE_LENGTHS), target, weight)
 
 
 @pytest.mark.parametrize("freedom", FREEDOMS)
@@ -159,7 +153,7 @@ def test_the_start_is_left_as_it_was(frame, target, freedom):
 def test_threads_find_the_same(frame, target):
     def solved(seed):
         noise = 0.1 * np.random.default_rng(seed).normal(size=frame.mesh.vertices.shape)
-        return solve(frame.moved(frame.mesh.vertices + noise, LENGTHS), target, 0.2, "all")
+        return solve(frame.moved(frame.mesh.vertices + noise, PEBBLE_LENGTHS), target, 0.2, "all")
 
     with ThreadPoolExecutor(4) as pool:
         for seed, (found, value) in enumerate(pool.map(solved, range(12))):

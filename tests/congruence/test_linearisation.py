@@ -2,9 +2,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
+from labelled_shapes import PEBBLE_LENGTHS, ellipsoid, labelled_pebble
 from plain_linearisation import plain_linearised, plain_merit, plain_offsets
 from quadratic_problem import pebble, rows, small_ring
 
@@ -13,24 +13,18 @@ from drkid.congruence.levenberg_marquardt import springs_of
 from drkid.congruence.linearisation import add_transposed, directions, slope_at, tried_at
 from drkid.congruence.rigidity import edge_vectors, rigidity_matrix
 from drkid.congruence.target import Target
-from drkid.mesh import TriMesh
 
-LENGTHS = np.array([0.95, 1.06])
 WEIGHTS = (0.0, 0.03, 0.7)
 
 
 @pytest.fixture(scope="module")
 def frame():
-    mesh = pebble()
-    return Framework(mesh, np.random.default_rng(1).integers(2, size=len(mesh.edges)), LENGTHS)
+    return labelled_pebble()
 
 
 @pytest.fixture(scope="module")
 def target():
-    """A smooth ellipsoid that the pebble was roughly made on."""
-    sphere = trimesh.creation.icosphere(subdivisions=4)
-    size = pebble().extents / 2 / [1.3, 1.0, 0.9]
-    return Target(TriMesh(sphere.vertices * [1.3, 1.0, 0.9] * size.mean(), sphere.faces))
+    return ellipsoid()
 
 
 def evaluated(frame, target, weight):
@@ -42,7 +36,7 @@ def evaluated(frame, target, weight):
 
 def central(function, frame, way, step):
     """The derivative of a function of frameworks along a way of the vertices, by central differences."""
-    ahead, behind = (function(frame.moved(frame.mesh.vertices + s * way, LENGTHS)) for s in (step, -step))
+    ahead, behind = (function(frame.moved(frame.mesh.vertices + s * way, PEBBLE_LENGTHS)) for s in (step, -step))
     return (ahead - behind) / (2 * step)
 
 
@@ -67,7 +61,7 @@ def test_everything_is_what_the_plain_evaluation_finds(frame, target, weight, am
 
 def test_handles_make_no_difference():
     ring = small_ring()
-    frame = Framework(ring, np.arange(len(ring.edges)) % 2, LENGTHS)
+    frame = Framework(ring, np.arange(len(ring.edges)) % 2, PEBBLE_LENGTHS)
     at, target = shaken(frame, 0.1, 0), Target(ring)
     trial, slope = evaluated(at, target, 0.5)
     plain = plain_linearised(at, target, 0.5)
@@ -77,7 +71,9 @@ def test_handles_make_no_difference():
 
 
 def test_merit_is_the_sum_that_the_module_states(frame, target):
-    lengths = sum((len_ - LENGTHS[i]) ** 2 for len_, i in zip(frame.mesh.edge_lengths, frame.labels, strict=True))
+    lengths = sum(
+        (len_ - PEBBLE_LENGTHS[i]) ** 2 for len_, i in zip(frame.mesh.edge_lengths, frame.labels, strict=True)
+    )
     offset, _ = plain_offsets(target, frame.mesh.vertices)
     assert evaluated(frame, target, 0.0)[0].merit == pytest.approx(lengths)
     assert evaluated(frame, target, 0.3)[0].merit == pytest.approx(lengths + 0.09 * offset @ frame.stiffness @ offset)
@@ -85,7 +81,7 @@ def test_merit_is_the_sum_that_the_module_states(frame, target):
 
 def test_a_trial_keeps_where_it_was_made(frame, target):
     springs, slots = springs_of(frame, target, 0.3, "none"), np.zeros(len(frame.mesh.vertices), np.int64)
-    vertices, lengths = 1.1 * frame.mesh.vertices, 1.2 * LENGTHS
+    vertices, lengths = 1.1 * frame.mesh.vertices, 1.2 * PEBBLE_LENGTHS
     trial = tried_at(vertices, lengths, springs, slots)
     np.testing.assert_array_equal(trial.vertices, vertices)
     np.testing.assert_array_equal(trial.lengths, lengths)
@@ -163,7 +159,7 @@ def test_the_guesses_of_an_earlier_trial_do_not_matter(frame, target):
     springs, slots = springs_of(frame, target, 0.4, "none"), np.zeros(len(frame.mesh.vertices), np.int64)
     for seed in range(5):
         at = shaken(frame, 0.2, seed)
-        trial = tried_at(np.array(at.mesh.vertices), LENGTHS, springs, slots)
+        trial = tried_at(np.array(at.mesh.vertices), PEBBLE_LENGTHS, springs, slots)
         assert trial.merit == pytest.approx(evaluated(at, target, 0.4)[0].merit, rel=1e-12)
 
 
@@ -174,7 +170,7 @@ def test_an_edge_without_length_is_told(frame, target, place):
     with pytest.raises(np.linalg.LinAlgError, match="no length"):
         directions(vertices, edges)
     with pytest.raises(np.linalg.LinAlgError, match="no length"):
-        evaluated(frame.moved(vertices, LENGTHS), target, 0.3)
+        evaluated(frame.moved(vertices, PEBBLE_LENGTHS), target, 0.3)
 
 
 def test_threads_find_the_same(frame, target):

@@ -2,16 +2,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from labelled_shapes import SOFT_WEIGHT, softly_solved
 
 from drkid.congruence.framework import Framework
-from drkid.congruence.labelling import nearest_labels, repaired
 from drkid.congruence.palette import Palette, palette_of_classes
 from drkid.congruence.patch import Patch, annealed_patch, ball, local_model, neighbours, packing, put_back
 from drkid.congruence.quadratic_model import price_of_labels
-from drkid.congruence.sparse_solve import sparse_linearised, sparse_smoothness, sparse_solve
+from drkid.congruence.sparse_solve import sparse_linearised, sparse_smoothness
 from drkid.congruence.target import Target
 
-WEIGHT, DAMPING = 0.4, 0.05
+WEIGHT, DAMPING = SOFT_WEIGHT, 0.05
 
 
 @pytest.fixture(scope="module")
@@ -25,13 +25,9 @@ def target(potato) -> Target:
 
 
 @pytest.fixture(scope="module")
-def frame(target, palette) -> Framework:
+def frame(target) -> Framework:
     """The potato in units of its mean edge, labelled and softly solved."""
-    mesh = target.mesh
-    lengths = np.array([0.93, 1.08])
-    labels = repaired(mesh, nearest_labels(mesh, lengths), palette, lengths, np.random.default_rng(0))
-    assert labels is not None
-    return sparse_solve(Framework(mesh, labels, lengths), target, WEIGHT, "scale", 4)[0]
+    return softly_solved(target)
 
 
 @pytest.fixture(scope="module")

@@ -93,6 +93,7 @@ def run(solver: Solver[S], mesh: TriMesh, progress: Progress) -> Solution:
     An interruption (Ctrl-C) ends the search of an anytime solver, whose best mesh so far is the answer; of another
     solver it passes through, and so does a second one.
     """
+    progress("starting", 0.0)
     state = solver.init(mesh)
     convergence = list(state.history)
     while (outcome := solver.finished(state)) is None:
