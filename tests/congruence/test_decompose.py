@@ -96,7 +96,8 @@ def test_the_driver_tells_how_far_it_is(coarse):
     fractions = [fraction for _, fraction in told]
     assert fractions == sorted(fractions)
     assert fractions[-1] == pytest.approx(1)
-    assert "largest error" in told[0][0]
+    assert told[0] == ("starting", 0.0)
+    assert "largest error" in told[1][0]
 
 
 def test_nearly_isosceles_classes_are_made_isosceles():
