@@ -38,7 +38,7 @@ from drkid.congruence.levenberg_marquardt import Freedom
 from drkid.congruence.palette import Palette, palette_of_classes
 from drkid.congruence.score import Yardstick
 from drkid.congruence.solver import Candidate
-from drkid.congruence.target import Target
+from drkid.congruence.target import Target, through_vertices
 from drkid.congruence.triangle_space import ascending_lengths, clustering_error
 from drkid.kit import Convergence, Outcome
 from drkid.mesh import TriMesh, read_only
@@ -68,6 +68,7 @@ class PaletteState:
     round: int
     began: float
     history: tuple[Convergence, ...]
+    round_seconds: float = 0.0
 
     @property
     def iteration(self) -> int:
@@ -109,7 +110,7 @@ class PaletteSolver:
         with threadpool_limits(1):
             palette = palette_of(self.spec, unit, np.random.default_rng([self.spec.seed, 0, STARTS]), large=large)
         free: Freedom = "scale" if palette.held else "all"
-        target = Target(self.surface.scaled(1 / scale))
+        target = through_vertices(self.surface.scaled(1 / scale), unit)
         problem = Problem(target, palette, free if mesh.genus == 0 else "none", mesh.genus == 0)
         yardstick = Yardstick(unit, self.spec)
         dense = len(mesh.faces) <= MOST_DENSE_FACES
@@ -136,9 +137,10 @@ class PaletteSolver:
 
     def step(self, state: PaletteState) -> PaletteState:
         """One round: a step of each walk, or a weight or a hop of a large mesh."""
+        began = time.monotonic()
         with threadpool_limits(1):
             after = self._large_step(state) if _is_large(state.found.frame.mesh) else self._walked(state)
-        after = replace(after, round=state.round + 1)
+        after = replace(after, round=state.round + 1, round_seconds=time.monotonic() - began)
         return replace(after, history=(_recorded(after),))
 
     def _walked(self, state: PaletteState) -> PaletteState:
@@ -209,13 +211,17 @@ class PaletteSolver:
         )
 
     def fraction(self, state: PaletteState) -> float:
-        """Rounds or seconds used, of those given; the start of a large mesh is always finished."""
-        started = state.round / ROUNDS if _is_large(state.found.frame.mesh) else 1.0
+        """Rounds or seconds used, of those given; the start of a large mesh is always finished.
+
+        A hop of a large mesh is not begun where one as long as the last round would end too late.
+        """
+        large = _is_large(state.found.frame.mesh)
+        started = state.round / ROUNDS if large else 1.0
         if self.spec.rounds is not None:
             used = state.round / self.spec.rounds if self.spec.rounds else 1.0
         else:
             seconds = self.spec.seconds or default_seconds(len(state.found.frame.mesh.faces))
-            used = (time.monotonic() - state.began) / seconds
+            used = (time.monotonic() - state.began + (state.round_seconds if large else 0.0)) / seconds
         return used if started >= 1 else min(max(used, started), ALMOST)
 
 
