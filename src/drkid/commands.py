@@ -18,6 +18,19 @@ PALETTE = {"palette", "like", "multisets"}  # lengths and triangles from outside
 STALLED = 3  # exit status: the kit is written, but the asked tolerance was not reached
 NOT_AS_STATED = 1  # exit status of `check` for a kit whose files do not bear out its numbers
 TYPED_AS_TEXT = ("spacing", "bed_mm", "palette", "bevel_degrees")  # lists, which a person types as one word
+NOT_TYPED = ("process_values",)  # written to kit.json and read from it, but no flag
+FROM_PROCESS = {  # what kit.json has because of its process
+    "process_values",
+    "clearance_mm",
+    "rod_clearance_mm",
+    "rod_diameter_mm",
+    "knuckles",
+    "min_wall_mm",
+    "knuckle_wall_mm",
+    "mark_depth_mm",
+    "thickness_mm",
+}
+SCALES = {"size_mm", "mean_edge_mm", "fit"}  # one of them at a time
 GROUPS = ("Input", "Mesh", "Congruence", "Pieces")  # in the order in which help shows them
 
 # ---- flags from KitSpec
@@ -27,6 +40,8 @@ def _spec_parameters() -> list[inspect.Parameter]:
     """One keyword for each field of KitSpec; None where it is not given."""
     found: list[inspect.Parameter] = []
     for name, field in KitSpec.model_fields.items():
+        if name in NOT_TYPED:
+            continue
         extra = field.json_schema_extra
         group = str(extra["group"]) if isinstance(extra, dict) else GROUPS[0]
         annotation: Any = str if name in TYPED_AS_TEXT else field.annotation
@@ -66,7 +81,7 @@ def _spec(file: Path | None, flags: dict[str, Any]) -> KitSpec:
 def _replaced(values: dict[str, Any], given: dict[str, Any]) -> set[str]:
     """Parameters of a file that no longer hold because a flag takes their place, or what follows from them changes."""
     replaced = {"vertices"} if "faces" in given else {"faces"} if "vertices" in given else set[str]()
-    replaced |= _chosen_for_the_method(values, given)
+    replaced |= _chosen_for_the_method(values, given) | _chosen_for_the_pieces(values, given)
     if "classes" in given:
         replaced.add("multisets")
     if "seconds" in given:
@@ -88,6 +103,16 @@ def _chosen_for_the_method(values: dict[str, Any], given: dict[str, Any]) -> set
     own = values.get("method")
     asked = given.get("method", "palette" if given.keys() & PALETTE else own)
     return {"classes", "tolerance_percent", "rounds"} if own not in (None, asked) else set()
+
+
+def _chosen_for_the_pieces(values: dict[str, Any], given: dict[str, Any]) -> set[str]:
+    """What a file has for its own process or scale, if a flag asks for another."""
+    replaced = set(SCALES) if given.keys() & SCALES else set[str]()
+    if "process" in values and given.get("process", values["process"]) != values["process"]:
+        replaced |= FROM_PROCESS
+    if given.get("connector", values.get("connector")) != values.get("connector"):
+        replaced |= {"rod_diameter_mm", "knuckles", "thickness_mm"}
+    return replaced
 
 
 def _spec_file(path: Path) -> dict[str, Any]:

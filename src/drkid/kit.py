@@ -150,7 +150,8 @@ class Dimensions:
     """Lengths in mm that every piece and connector of a kit shares (`fabrication`: the names and formulas).
 
     `pocket_width_mm` along the side, `pocket_depth_mm` into the piece, `pocket_height_mm` across the middle plane.
-    Fields of the rod are 0 where the connector has none.
+    Fields of the rod are 0 where the connector has none, and so are those of what else a connector may lack: where its
+    full width begins behind the axis, the height of the bump that holds it, a snap's pin, a key's bend.
     """
 
     connector: ConnectorKind
@@ -168,6 +169,11 @@ class Dimensions:
     pocket_width_mm: float
     pocket_depth_mm: float
     pocket_height_mm: float
+    grip_start_mm: float = 0.0
+    detent_mm: float = 0.0
+    draft_degrees: float = 0.0
+    pin_diameter_mm: float = 0.0
+    key_bend_degrees: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

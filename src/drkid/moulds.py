@@ -54,7 +54,12 @@ def with_moulds_of(spec: KitSpec) -> KitSpec:
 def _mould_values(document: KitDocument) -> dict[str, Any]:
     """What shapes a kit's pieces besides their sides: process, thickness, bevel, connector and clearances."""
     groups = {name: field.json_schema_extra for name, field in KitSpec.model_fields.items()}
-    shaping = {name for name, group in groups.items() if group == {"group": "Pieces"}} - {"size_mm", "bed_mm"}
+    shaping = {name for name, group in groups.items() if group == {"group": "Pieces"}} - {
+        "size_mm",
+        "mean_edge_mm",
+        "fit",
+        "bed_mm",
+    }
     return {name: value for name, value in document.spec.items() if name in shaping and value is not None}
 
 

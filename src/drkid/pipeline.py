@@ -158,6 +158,9 @@ def _resolved(spec: KitSpec, surface: Surface, printed: Decomposition, part_set:
             "rod_diameter_mm": dimensions.rod_diameter_mm or None,
             "min_wall_mm": dimensions.min_wall_mm,
             "knuckle_wall_mm": dimensions.knuckle_wall_mm,
+            "knuckles": dimensions.knuckles or None,
+            "mean_edge_mm": None,
+            "fit": False,
             "mark_depth_mm": spec.preset.mark_depth_mm if spec.mark_depth_mm is None else spec.mark_depth_mm,
         }
     )

@@ -1,6 +1,5 @@
 """KitSpec: every parameter with unit, default, limits and help. Flags, JSON Schema and documents come from it."""
 
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast
@@ -8,11 +7,12 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from drkid.errors import SpecError
+from drkid.process import PROCESSES, ProcessPreset, is_process_file, read_process
 
-Process = Literal["fdm", "sla", "polyjet", "injection"]
 Method = Literal["pressure", "palette"]
 Thickening = Literal["bisector", "mean_normal", "perpendicular"]
-ConnectorKind = Literal["hinge", "box", "none"]
+ConnectorKind = Literal["hinge", "snap", "box", "none"]
+Retention = Literal["detent", "glue"]
 Unit = Literal["angstrom", "nm", "um", "mm"]
 
 DEFAULT_FACES = 172  # the size of the paper's printed mitochondrion (table 1, M4)
@@ -29,36 +29,6 @@ UNIVERSAL_BEVEL = (60.0, 90.0)
 LEAST_RATIO, MOST_RATIO = 1.03, 1.6  # of given lengths: nearer ones are one length to a hand, others make slivers
 MOST_CLASSES = {2: 4, 3: 10}  # of a palette of two or three lengths
 MULTISETS = {1: "ssl", 2: "ssl,sll", 3: "sss,ssl,sll", 4: "sss,ssl,sll,lll"}  # of two lengths, by number of classes
-
-
-@dataclass(frozen=True)
-class ProcessPreset:
-    """What a manufacturing process can do; lengths in mm.
-
-    `clearance_mm` lies between connector and pocket, `rod_clearance_mm` around the rod (radial);
-    `rods_mm` are the stock diameters, ascending.
-    """
-
-    clearance_mm: float
-    rod_clearance_mm: float
-    min_wall_mm: float
-    knuckle_wall_mm: float
-    knuckle_length_mm: float
-    knuckle_gap_mm: float
-    min_hole_mm: float
-    engrave_width_mm: float
-    mark_depth_mm: float
-    rods_mm: tuple[float, ...]
-    density_g_cm3: float
-    max_wall_mm: float | None = None
-
-
-PROCESSES: dict[Process, ProcessPreset] = {
-    "fdm": ProcessPreset(0.20, 0.15, 1.2, 1.0, 3.0, 0.40, 2.0, 0.6, 0.4, (1.75, 2.0, 3.0), 1.24),
-    "sla": ProcessPreset(0.15, 0.10, 1.0, 0.8, 2.0, 0.30, 0.5, 0.4, 0.4, (1.0, 1.5, 2.0), 1.18),
-    "polyjet": ProcessPreset(0.15, 0.10, 1.0, 0.8, 2.0, 0.30, 1.0, 0.5, 0.5, (1.0, 1.5, 2.0), 1.18),
-    "injection": ProcessPreset(0.08, 0.05, 1.2, 0.8, 2.0, 0.15, 0.0, 0.5, 0.3, (1.0, 1.5, 2.0), 1.04, 3.5),
-}
 
 
 def _split_commas(value: object) -> object:
@@ -207,22 +177,36 @@ class KitSpec(BaseModel):
     kmeans_restarts: int = _field(8, "Congruence", "Starts of k-means, of which the best is kept.", ge=1, le=1000)
     seed: int = _field(0, "Congruence", "Seed of every random choice: the same seed makes the same kit.", ge=0)
 
-    process: Process = _field("fdm", "Pieces", "Manufacturing process: sets clearances, walls and rods.")
+    process: str = _field(
+        "fdm",
+        "Pieces",
+        f"Manufacturing process: sets clearances, walls and rods; {', '.join(PROCESSES)}, or a TOML file of your own.",
+    )
     size_mm: float | None = _field(
         None,
         "Pieces",
-        "Longest side of the printed object; the smallest that fits when not given.",
+        "Longest side of the printed object; the smallest that fits when neither this nor --mean-edge-mm is given.",
         gt=0,
     )
     thickness_mm: float | None = _field(None, "Pieces", "Thickness of the pieces.", gt=0)
     thickening: Thickening = _field(
         "bisector", "Pieces", "How the sides are bevelled: bisector cannot collide, mean_normal is the paper's."
     )
-    connector: ConnectorKind = _field("hinge", "Pieces", "What joins two pieces: hinge (with a rod), box key, none.")
+    connector: ConnectorKind = _field(
+        "hinge",
+        "Pieces",
+        "What joins two pieces: hinge (with a metal rod), snap (hinge without metal), box (a rigid key to glue), none.",
+    )
     clearance_mm: float | None = _field(None, "Pieces", "Gap between connector and pocket.", ge=0)
     rod_clearance_mm: float | None = _field(None, "Pieces", "Gap around the rod, radial.", ge=0)
     rod_diameter_mm: float | None = _field(None, "Pieces", "Diameter of the hinge's metal rod.", gt=0)
-    knuckles: int = _field(2, "Pieces", "Knuckles of a hinge, even: both halves are then one part.", ge=2, le=12)
+    knuckles: int | None = _field(
+        None,
+        "Pieces",
+        "Knuckles of a hinge, even: both halves are then one part; when not given as many as find room.",
+        ge=2,
+        le=12,
+    )
     min_wall_mm: float | None = _field(None, "Pieces", "Thinnest wall of a piece.", gt=0)
     knuckle_wall_mm: float | None = _field(None, "Pieces", "Wall of the hinge around its rod.", gt=0)
     mark_depth_mm: float | None = _field(None, "Pieces", "Depth of engraved marks.", ge=0)
@@ -236,6 +220,17 @@ class KitSpec(BaseModel):
         f"when not given, {', '.join(f'{x:g}' for x in UNIVERSAL_BEVEL)} where lengths are.",
     )
     bed_mm: Triple = _field((220.0, 220.0, 250.0), "Pieces", "Build volume X,Y,Z of the printer.")
+    mean_edge_mm: float | None = _field(None, "Pieces", "Mean edge of the pieces, in place of --size-mm.", gt=0)
+    fit: bool = _field(
+        False, "Pieces", "Take the smallest size at which pockets and walls fit: what is done when no size is given."
+    )
+    retention: Retention = _field(
+        "detent", "Pieces", "What holds a hinge in its pocket: detent (a bump that springs into a groove), or glue."
+    )
+    marks: bool = _field(True, "Pieces", "Engrave class letter and side ticks on the inner face.")
+    process_values: ProcessPreset | None = _field(
+        None, "Pieces", "What the process can do where it is a user's own: written to kit.json, read from --process."
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -244,7 +239,7 @@ class KitSpec(BaseModel):
         if not isinstance(values, dict):
             return values
         given = cast("dict[str, object]", values)
-        return _implied_by_palette(given) | given
+        return _implied_by_palette(given) | given | _own_process(given)
 
     @model_validator(mode="after")
     def _consistent(self) -> "KitSpec":
@@ -254,13 +249,13 @@ class KitSpec(BaseModel):
         if self.faces is not None and self.faces % 2:
             message = f"faces is {self.faces}: a closed surface of triangles has an even number of them"
             raise ValueError(message)
-        if self.knuckles % 2:
+        if self.knuckles is not None and self.knuckles % 2:
             message = f"knuckles is {self.knuckles}: an even number makes both halves of a hinge the same part"
             raise ValueError(message)
         if self.faces is not None and self.classes > self.faces:
             message = f"classes is {self.classes}, more than the {self.faces} faces"
             raise ValueError(message)
-        contradiction = _contradiction(self)
+        contradiction = _contradiction(self) or _contradiction_of_pieces(self)
         if contradiction:
             raise ValueError(contradiction)
         return self
@@ -268,7 +263,7 @@ class KitSpec(BaseModel):
     @property
     def preset(self) -> ProcessPreset:
         """The manufacturing process's own values."""
-        return PROCESSES[self.process]
+        return PROCESSES[self.process] if self.process_values is None else self.process_values
 
     @classmethod
     def parse(cls, values: dict[str, Any]) -> "KitSpec":
@@ -342,6 +337,29 @@ def _contradiction(spec: KitSpec) -> str:
     if spec.bevel_degrees is not None and spec.thickening != "bisector":
         return f"bevel_degrees is given and thickening is {spec.thickening}: only bisector follows bends"
     return _palette_contradiction(spec)
+
+
+def _own_process(given: dict[str, object]) -> dict[str, object]:
+    """Name and values of a process that is given by its file."""
+    process = given.get("process")
+    if not isinstance(process, str) or not is_process_file(process):
+        return {}
+    return {"process": Path(process).stem, "process_values": read_process(Path(process))}
+
+
+def _contradiction_of_pieces(spec: KitSpec) -> str:
+    """What is wrong between process and scale; empty where nothing is."""
+    if spec.process_values is None and spec.process not in PROCESSES:
+        known = ", ".join(f"'{name}'" for name in PROCESSES)
+        return f"process is {spec.process}, which is not known: {known}, or the path of a .toml file that describes it"
+    scales = [name for name in ("size_mm", "mean_edge_mm") if getattr(spec, name) is not None]
+    scales += ["fit"] if spec.fit else []
+    if len(scales) > 1:
+        return f"{scales[0]} and {scales[1]} are both given: one of them sets the scale"
+    lengths = next((name for name in ("palette", "like") if getattr(spec, name) is not None), None)
+    if lengths is not None and scales and scales != ["size_mm"]:
+        return f"{scales[0]} and {lengths} are both given: the lengths of {lengths} set the scale"
+    return ""
 
 
 def _palette_contradiction(spec: KitSpec) -> str:

@@ -24,7 +24,7 @@ def part_name(part: Part) -> str:
 def connector_names(kit: Kit) -> list[str]:
     """The files that a joint of this kit names: both halves of a hinge, one key, or none."""
     files = [connector_file(c.name) for c in kit.part_set.connectors]
-    return files * 2 if kit.spec.connector == "hinge" and len(files) == 1 else files
+    return files * 2 if kit.spec.connector in {"hinge", "snap"} and len(files) == 1 else files
 
 
 def kit_document(kit: Kit) -> doc.KitDocument:

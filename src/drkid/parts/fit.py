@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from math import cos, radians, sin
 
 import numpy as np
 
@@ -9,11 +10,14 @@ from drkid.errors import FitError
 from drkid.kit import Dimensions
 from drkid.mesh import Floats
 from drkid.parts.class_triangle import inward_normals
+from drkid.parts.detent import groove
+from drkid.parts.pocket import depth_mm, flare_mm
 from drkid.parts.prismoid import Prismoid, side_insets
 
 SCALE_TOLERANCE = 1e-5  # relative: the size is rounded up to whole mm afterwards
 SCALE_STEP = 1.5
 MOST_STEPS = 60
+LEAST_MM = 1e-6  # between corners of a pocket's outline, so that every side of it has a direction
 FITS_MM = -1e-6  # slack that still counts as fitting: a size that was computed fits again when it is given
 
 
@@ -46,13 +50,21 @@ def margins(triangle: Floats, prismoid: Prismoid, dimensions: Dimensions) -> Ite
     wall = dimensions.min_wall_mm
     insets = prismoid.insets(triangle)
     slope = (insets[0] - insets[1]) / dimensions.thickness_mm
-    for height in (low, dimensions.pocket_height_mm / 2):
+    for height in _telling_heights(dimensions, low):
         outline = prismoid.outline(height)
-        pockets = pocket_outlines(triangle, outline, dimensions)
+        pockets = pocket_outlines(triangle, outline, dimensions, height)
         between = min(convex_distance(pockets[i], pockets[i - 1]) for i in range(3))
         yield Margin("wall between two pockets", wall, between)
         across = _bevel_distance(pockets, outline)
         yield Margin("wall between pocket and bevel", wall, _nearest(across, slope, height - low, high - height))
+
+
+def _telling_heights(dimensions: Dimensions, low: float) -> tuple[float, ...]:
+    """Between which pockets and bevels change linearly: inner face, foot of the grooves on either side, roof's ends."""
+    ridge, lean = groove(dimensions), radians(dimensions.key_bend_degrees / 2)
+    grooved = () if ridge is None else (ridge.z - ridge.half_base, ridge.z + ridge.half_base)
+    inner_end = dimensions.pocket_height_mm / 2 * cos(lean) - dimensions.pocket_depth_mm * sin(lean)
+    return (low, *grooved, *((max(low, inner_end),) if lean else ()), dimensions.pocket_height_mm / 2)
 
 
 def inradius(triangle: Floats, outline: Floats) -> float:
@@ -63,16 +75,26 @@ def inradius(triangle: Floats, outline: Floats) -> float:
     return float(np.sign(whole.min()) * 2 * area / np.linalg.norm(along, axis=1).sum())
 
 
-def pocket_outlines(triangle: Floats, outline: Floats, dimensions: Dimensions) -> Floats:
-    """(3, 4, 2): the rectangle of each side's pocket in a section of the piece, from the bevel to its floor."""
+def pocket_outlines(triangle: Floats, outline: Floats, dimensions: Dimensions, height_mm: float) -> Floats:
+    """(3, n, 2): each side's pocket in a section of the piece, from the bevel to its floor.
+
+    A rectangle, or, where grooves are, the convex hexagon around pocket and grooves.
+    """
     inward, following = inward_normals(triangle), np.roll(triangle, -1, axis=0)
     along = np.stack([inward[:, 1], -inward[:, 0]], axis=1)
-    half, floor = dimensions.pocket_width_mm / 2, dimensions.pocket_depth_mm
-    mouth = np.minimum(side_insets(triangle, outline), floor)
-    x = np.array([-half, half, half, -half])[None, :]
-    y = np.stack([mouth, mouth, np.full(3, floor), np.full(3, floor)], axis=1)
+    half, floor = dimensions.pocket_width_mm / 2 + flare_mm(dimensions, height_mm), depth_mm(dimensions, height_mm)
+    mouth = np.minimum(side_insets(triangle, outline), floor - LEAST_MM)
+    ends = np.full(3, floor)
+    ridge = groove(dimensions)
+    if ridge is None or abs(height_mm - ridge.z) > ridge.half_base + LEAST_MM:
+        x, y = np.array([-half, half, half, -half]), np.stack([mouth, mouth, ends, ends], axis=1)
+    else:
+        wide = max(half, dimensions.pocket_width_mm / 2 + ridge.height)
+        end = min(ridge.end, floor - LEAST_MM)
+        near, far = np.minimum(mouth, end - LEAST_MM), np.full(3, end)
+        x, y = np.array([-wide, wide, wide, half, -half, -wide]), np.stack([near, near, far, ends, ends, far], axis=1)
     middle = (triangle + following) / 2
-    return middle[:, None] + x[..., None] * along[:, None] + y[..., None] * inward[:, None]
+    return middle[:, None] + x[None, :, None] * along[:, None] + y[..., None] * inward[:, None]
 
 
 def _bevel_distance(pockets: Floats, outline: Floats) -> Floats:

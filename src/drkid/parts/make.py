@@ -1,16 +1,17 @@
 """The one function of this stage."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import count
 from math import ceil, degrees
 
 import numpy as np
 
 from drkid.errors import FitError
-from drkid.kit import Connector, Decomposition, Dimensions, Part, PartSet, class_id
+from drkid.kit import Connector, Decomposition, Dimensions, Handedness, Part, PartSet, class_id
 from drkid.mesh import Floats, Ints, read_only
 from drkid.parts.class_triangle import LEFT_CORNERS, is_mirror_symmetric, laid_down, printed_lengths
-from drkid.parts.dimensions import proposed
+from drkid.parts.dimensions import proposals
 from drkid.parts.fit import FITS_MM, Margin, margins, smallest_scale
 from drkid.parts.groove import groove_mm, recesses
 from drkid.parts.hinge import hinge_half
@@ -19,6 +20,7 @@ from drkid.parts.members import Members, members_of
 from drkid.parts.notes import notes
 from drkid.parts.pocket import pocket, side_frames
 from drkid.parts.prismoid import Prismoid
+from drkid.parts.snap import snap_half
 from drkid.parts.thickening import thickened
 from drkid.progress import Progress, silent
 from drkid.spec import KitSpec
@@ -26,6 +28,8 @@ from drkid.spec import KitSpec
 MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 FIRST_GUESS_THICKNESSES = 4.0  # mean edge of the pieces with which the search for a size begins
 WHOLE_MM = 1e-6
+MOST_OF_SIDE = 0.4  # of the shortest side: how wide a pocket may be that is proposed for its strength
+SMALLER = 1 - 1e-4  # of a scale: what another connector must save to be taken
 
 
 def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress = silent) -> PartSet:
@@ -43,8 +47,8 @@ def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress =
     members = members_of(decomposition)
     bends = spec.bevel_degrees or (degrees(float(np.abs(members.bend_radians).max())),)
     sharpest = max(bends) + spec.swing_degrees
-    design = _Design(decomposition, members, proposed(spec, sharpest), spec)
     progress("finding the size", 0.2)
+    design = _chosen([_Design(decomposition, members, d, spec) for d in proposals(spec, sharpest)])
     scale = _scale(design)
     progress("cutting parts", 0.5)
     shapes = design.pieces(scale)
@@ -58,7 +62,7 @@ def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress =
         scale_mm_per_unit=scale,
         dimensions=design.dimensions,
         parts=parts,
-        connectors=_connectors(design.dimensions, sharpest),
+        connectors=_connectors(design.dimensions),
         face_part=face_part,
         face_turn=members.turn,
         groove_mm=read_only(groove_mm(decomposition.mesh, members, recess)),
@@ -80,6 +84,12 @@ class _Design:
         """Longest side of the mesh's bounding box in its own unit."""
         return float(self.decomposition.mesh.extents.max())
 
+    @property
+    def asked_size_mm(self) -> float | None:
+        """Longest side of the print as given, or as the given mean edge makes it."""
+        edge = self.spec.mean_edge_mm
+        return self.spec.size_mm if edge is None else edge / self.decomposition.mesh.mean_edge * self.longest
+
     def triangles(self, scale: float) -> Floats:
         return laid_down(printed_lengths(self.decomposition.class_lengths, scale))
 
@@ -96,6 +106,7 @@ class _Design:
     def slack_mm(self, scale: float) -> float:
         return self.tightest(scale)[1].slack_mm
 
+    @cached_property
     def smallest_scale(self) -> float:
         """At which everything fits."""
         mean_length = float(self.decomposition.class_lengths.mean())
@@ -104,22 +115,45 @@ class _Design:
 
     def smallest_size_mm(self) -> int:
         """Whole mm of the longest side at which everything fits."""
-        first = ceil(self.smallest_scale() * self.longest - WHOLE_MM)
+        first = ceil(self.smallest_scale * self.longest - WHOLE_MM)
         return next(size for size in count(first) if self.slack_mm(size / self.longest) >= 0)
+
+
+def _chosen(designs: list[_Design]) -> _Design:
+    """Of designs that differ in their connector, the one that makes the smallest print.
+
+    Where the size is given, of those that fit the one with the thinnest pieces and then the most knuckles, as long as
+    the pockets leave most of the shortest side. Lengths that are given take the first: their pieces are to be the same
+    for every shape.
+    """
+    first = designs[0]
+    if len(designs) == 1 or first.decomposition.scale_mm_per_unit is not None:
+        return first
+    if first.asked_size_mm is not None:
+        scale = first.asked_size_mm / first.longest
+        shortest = float(first.decomposition.class_lengths.min()) * scale
+        fitting = [d for d in designs if d.slack_mm(scale) >= FITS_MM]
+        modest = [d for d in fitting if d.dimensions.pocket_width_mm <= MOST_OF_SIDE * shortest] or fitting[:1]
+        return min(modest or [first], key=lambda d: (d.dimensions.thickness_mm, -d.dimensions.knuckles))
+    best, least = first, first.smallest_scale
+    for design in designs[1:]:
+        if design.slack_mm(least * SMALLER) >= 0:
+            best, least = design, design.smallest_scale
+    return best
 
 
 def _scale(design: _Design) -> float:
     fixed = design.decomposition.scale_mm_per_unit
     if fixed is not None:
         return _required_scale(design, fixed)
-    size = design.spec.size_mm
+    size = design.asked_size_mm
     if size is None:
         return design.smallest_size_mm() / design.longest
     index, margin = design.tightest(size / design.longest)
     if margin.slack_mm < FITS_MM:
         sides = ", ".join(f"{x:.1f}" for x in design.decomposition.class_lengths[index] * size / design.longest)
         raise FitError(
-            f"the {margin.what} of class {class_id(index)} (sides {sides} mm) does not fit at size_mm {size:g}",
+            f"the {margin.what} of class {class_id(index)} (sides {sides} mm) does not fit at size_mm {size:.4g}",
             wanted=f"{margin.needed_mm:.2f} mm",
             found=f"{margin.available_mm:.2f} mm",
             remedy=f"a larger print (--size-mm {design.smallest_size_mm()} or more), fewer pieces (--faces), "
@@ -134,7 +168,7 @@ def _required_scale(design: _Design, scale: float) -> float:
     if margin.slack_mm >= FITS_MM:
         return scale
     sides = ", ".join(f"{x:g}" for x in np.round(design.decomposition.class_lengths[index] * scale, 6))
-    factor = design.smallest_scale() / scale
+    factor = design.smallest_scale / scale
     lengths = np.unique(np.round(design.decomposition.class_lengths * scale, 6))
     longer = ",".join(f"{ceil(10 * factor * x) / 10:g}" for x in lengths)
     raise FitError(
@@ -156,33 +190,35 @@ def _parts(design: _Design, shapes: tuple[Prismoid, ...], scale: float) -> tuple
         right = _right_part(design, index, triangle, shapes[index]) if hands else None
         for left in hands:
             face_part[own & (members.left == left)] = len(parts)
-            parts += [] if right is None else [_mirrored(right) if left else right]
+            parts += [] if right is None else [_mirrored(right, design.dimensions) if left else right]
     return tuple(parts), read_only(face_part)
 
 
 def _right_part(design: _Design, index: int, triangle: Floats, shape: Prismoid) -> Part:
-    frames = side_frames(triangle)
+    frames = side_frames(triangle, design.dimensions.key_bend_degrees / 2)
     solid = shape.solid
     if design.dimensions.connector != "none":
         solid = solid.minus_all([pocket(design.dimensions).moved(frame) for frame in frames])
     symmetric = is_mirror_symmetric(design.decomposition.class_lengths[index])
-    return Part(index, "any" if symmetric else "right", _flat(triangle), frames, solid)
+    hand: Handedness = "any" if symmetric else "right"
+    return Part(index, hand, _flat(triangle), frames, solid)
 
 
-def _mirrored(right: Part) -> Part:
+def _mirrored(right: Part, dimensions: Dimensions) -> Part:
     """The left part of a class: the mirror image of the right one, first side along x again."""
     triangle = (right.corners[:, :2] * [-1, 1])[list(LEFT_CORNERS)]
-    return Part(right.class_index, "left", _flat(triangle), side_frames(triangle), right.solid.moved(MIRROR))
+    frames = side_frames(triangle, dimensions.key_bend_degrees / 2)
+    return Part(right.class_index, "left", _flat(triangle), frames, right.solid.moved(MIRROR))
 
 
 def _flat(triangle: Floats) -> Floats:
     return read_only(np.column_stack([triangle, np.zeros(3)]))
 
 
-def _connectors(dimensions: Dimensions, sharpest_degrees: float) -> tuple[Connector, ...]:
-    if dimensions.connector == "hinge":
-        return (hinge_half(dimensions, sharpest_degrees),)
-    return (box_key(dimensions),) if dimensions.connector == "box" else ()
+def _connectors(dimensions: Dimensions) -> tuple[Connector, ...]:
+    makers = {"hinge": hinge_half, "snap": snap_half, "box": box_key}
+    maker = makers.get(dimensions.connector)
+    return () if maker is None else (maker(dimensions),)
 
 
 def _require_bed(part: Part, spec: KitSpec) -> None:

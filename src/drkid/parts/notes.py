@@ -8,7 +8,6 @@ from drkid.kit import Decomposition, Dimensions, class_id
 from drkid.mesh import Floats
 from drkid.parts.bevel import SHARPEST_JOINT_DEGREES, demanded
 from drkid.parts.groove import touching_mm
-from drkid.parts.key import largest_bend_degrees
 from drkid.parts.members import Members
 from drkid.spec import KitSpec
 
@@ -37,15 +36,21 @@ def notes(
 def _connector_notes(members: Members, dimensions: Dimensions) -> Iterator[str]:
     if dimensions.connector == "none":
         return
-    what = "the finished hinge is pressed in" if dimensions.connector == "hinge" else "the key is pressed in"
-    yield f"Pockets are open to the inner face: {what} from inside; only the fit holds it, so glue it if it falls out."
+    open_inwards = "Pockets are open to the inner face:"
     if dimensions.connector == "box":
-        bend, limit = np.degrees(members.bend_radians), largest_bend_degrees(dimensions)
+        bend, limit = np.degrees(members.bend_radians), dimensions.key_bend_degrees
         beyond = int((bend > limit).sum()) // 2
         yield (
-            f"The keys are straight: they follow bends up to {limit:.1f}°; {beyond} joints bend more, "
-            f"the sharpest by {np.abs(bend).max():.1f}°."
+            f"{open_inwards} the key is pressed in from inside, and glued. One key serves all joints, which bend from "
+            f"{bend.min():.1f}° to {bend.max():.1f}°: pockets lean for {limit:.1f}°, glue sets the angle; "
+            f"{beyond} joints bend more than a key follows."
         )
+        return
+    hold = "its bumps spring into grooves" if dimensions.detent_mm else "glue holds it"
+    yield (
+        f"{open_inwards} the finished hinge is pressed in from inside, straight outwards, until {hold}. "
+        "The last piece is pushed on from outside, over the halves that its neighbours hold."
+    )
 
 
 def _touching_notes(touching_mm: Floats, spec: KitSpec) -> Iterator[str]:
