@@ -11,7 +11,7 @@ from drkid.errors import SpecError
 
 Process = Literal["fdm", "sla", "polyjet", "injection"]
 Method = Literal["pressure", "palette"]
-Thickening = Literal["bisector", "mean_normal", "perpendicular"]
+Thickening = Literal["bisector", "flippable", "mean_normal", "perpendicular"]
 ConnectorKind = Literal["hinge", "box", "none"]
 Unit = Literal["angstrom", "nm", "um", "mm"]
 

@@ -11,7 +11,7 @@ from drkid.spec import KitSpec
 LEAST_GRIP_MM = 3.0  # how deep a hinge half sits in its pocket behind the barrel, at least
 KEY_GRIP_HEIGHTS = 2.0  # how deep a box key sits in its pocket, in heights of the key
 KEY_WALLS = 2.0  # height of a box key in minimum walls
-HOLD_SHARE = 0.25  # of the grip: what no bevel takes away
+HOLD_SHARE = 0.25  # of the least grip: what no bevel takes away
 PLAIN_WALLS = 2.5  # thickness of a piece without pockets in minimum walls
 THICKNESS_STEP_MM = 0.1
 ROUNDING = 1e-9
@@ -82,16 +82,26 @@ def grip_start_mm(barrel_radius_mm: float, knuckle_gap_mm: float, sharpest_degre
     Clear of the other half's barrel (radius r), and behind the plane between the two halves where they come
     nearest: r·tan(δ/2) at the barrel's height when the joint bends by δ.
     """
-    half_bend = radians(min(sharpest_degrees, SHARPEST_JOINT_DEGREES)) / 2
-    return barrel_radius_mm * max(1.0, tan(half_bend)) + knuckle_gap_mm
+    return barrel_radius_mm * max(1.0, _half_tangent(sharpest_degrees)) + knuckle_gap_mm
 
 
 def deepest_bevel_mm(dimensions: Dimensions) -> float:
-    """How far a bevel may cut behind the hinge axis without freeing the connector; infinite where there is none."""
+    """How far a bevel may cut behind the hinge axis, within `held_height_mm` of it, without freeing the connector.
+
+    Infinite where there is none.
+    """
     if dimensions.connector == "none":
         return float("inf")
-    reach = reach_mm(dimensions)
-    return reach - HOLD_SHARE * (reach - dimensions.barrel_diameter_mm / 2)
+    return reach_mm(dimensions) - HOLD_SHARE * max(dimensions.barrel_diameter_mm, LEAST_GRIP_MM)
+
+
+def held_height_mm(dimensions: Dimensions) -> float:
+    """How far from the middle plane a piece must hold its connector: half-way through the wall over the pocket."""
+    return (dimensions.pocket_height_mm + dimensions.min_wall_mm) / 2
+
+
+def _half_tangent(sharpest_degrees: float) -> float:
+    return tan(radians(min(sharpest_degrees, SHARPEST_JOINT_DEGREES)) / 2)
 
 
 def _given(value: float | None, proposal: float) -> float:
@@ -116,7 +126,9 @@ def _core(
         return _Core(height / 2, max(KEY_GRIP_HEIGHTS * height, LEAST_GRIP_MM))
     radius = barrel_mm / 2
     sharp = grip_start_mm(radius, spec.preset.knuckle_gap_mm, sharpest_degrees) + knuckle_wall_mm
-    return _Core(radius, max(radius + max(barrel_mm, LEAST_GRIP_MM), sharp))
+    roof = radius + _given(spec.clearance_mm, spec.preset.clearance_mm) + wall_mm / 2  # see held_height_mm
+    held = roof * _half_tangent(sharpest_degrees) + HOLD_SHARE * max(barrel_mm, LEAST_GRIP_MM)
+    return _Core(radius, max(radius + max(barrel_mm, LEAST_GRIP_MM), sharp, held))
 
 
 def _thickness_mm(spec: KitSpec, pocket_height_mm: float, wall_mm: float) -> float:

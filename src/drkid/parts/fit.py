@@ -14,6 +14,7 @@ from drkid.parts.prismoid import Prismoid, side_insets
 SCALE_TOLERANCE = 1e-5  # relative: the size is rounded up to whole mm afterwards
 SCALE_STEP = 1.5
 MOST_STEPS = 60
+LEAST_POCKET_MM = 1e-3  # a pocket that a bevel cuts off altogether counts as one so deep
 FITS_MM = -1e-6  # slack that still counts as fitting: a size that was computed fits again when it is given
 
 
@@ -35,7 +36,7 @@ def margins(triangle: Floats, prismoid: Prismoid, dimensions: Dimensions) -> Ite
     """Every length of a piece that must not fall short: triangle (3, 2), the piece around it, its pockets.
 
     Exact: pockets are convex polygons at every height, and the distances between them and to the bevels change
-    linearly between the pockets' roof and the inner face.
+    linearly between the inner face, the bevels' ridge and the pockets' roof.
     """
     low, high = prismoid.heights_mm
     least = max(dimensions.min_wall_mm, dimensions.thickness_mm / 2)
@@ -44,15 +45,17 @@ def margins(triangle: Floats, prismoid: Prismoid, dimensions: Dimensions) -> Ite
     if dimensions.connector == "none":
         return
     wall = dimensions.min_wall_mm
-    insets = prismoid.insets(triangle)
-    slope = (insets[0] - insets[1]) / dimensions.thickness_mm
-    for height in (low, dimensions.pocket_height_mm / 2):
+    roof = dimensions.pocket_height_mm / 2
+    for height in (*prismoid.levels_mm[prismoid.levels_mm < roof].tolist(), roof):
         outline = prismoid.outline(height)
         pockets = pocket_outlines(triangle, outline, dimensions)
         between = min(convex_distance(pockets[i], pockets[i - 1]) for i in range(3))
         yield Margin("wall between two pockets", wall, between)
         across = _bevel_distance(pockets, outline)
-        yield Margin("wall between pocket and bevel", wall, _nearest(across, slope, height - low, high - height))
+        for bottom, top, slope in prismoid.bevels(triangle):
+            if bottom <= height <= top:
+                distance = _nearest(across, slope, height - bottom, top - height)
+                yield Margin("wall between pocket and bevel", wall, distance)
 
 
 def inradius(triangle: Floats, outline: Floats) -> float:
@@ -68,7 +71,7 @@ def pocket_outlines(triangle: Floats, outline: Floats, dimensions: Dimensions) -
     inward, following = inward_normals(triangle), np.roll(triangle, -1, axis=0)
     along = np.stack([inward[:, 1], -inward[:, 0]], axis=1)
     half, floor = dimensions.pocket_width_mm / 2, dimensions.pocket_depth_mm
-    mouth = np.minimum(side_insets(triangle, outline), floor)
+    mouth = np.minimum(side_insets(triangle, outline), floor - LEAST_POCKET_MM)
     x = np.array([-half, half, half, -half])[None, :]
     y = np.stack([mouth, mouth, np.full(3, floor), np.full(3, floor)], axis=1)
     middle = (triangle + following) / 2
