@@ -10,7 +10,7 @@ from drkid.errors import SpecError
 from drkid.process import PROCESSES, ProcessPreset, is_process_file, read_process
 
 Method = Literal["pressure", "palette"]
-Thickening = Literal["bisector", "mean_normal", "perpendicular"]
+Thickening = Literal["bisector", "flippable", "mean_normal", "perpendicular"]
 ConnectorKind = Literal["hinge", "snap", "box", "none"]
 Retention = Literal["detent", "glue"]
 Unit = Literal["angstrom", "nm", "um", "mm"]

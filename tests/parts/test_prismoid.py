@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drkid.parts.class_triangle import laid_down
-from drkid.parts.prismoid import bevelled
+from drkid.parts.prismoid import bevelled, side_insets
 
 insets = st.lists(st.floats(-1.5, 1.5), min_size=6, max_size=6).map(lambda x: np.reshape(x, (2, 3)))
 
@@ -26,6 +26,23 @@ def test_solid_has_the_volume_of_its_sections(wanted) -> None:
     simpson = 6.0 * (areas[0] + 4 * areas[1] + areas[2]) / 6
     assert piece.solid.volume == pytest.approx(simpson)
     assert piece.solid.bounds[:, 2] == pytest.approx([-3, 3])
+
+
+@given(st.lists(st.floats(0, 2), min_size=9, max_size=9))
+def test_a_ridged_piece_is_bounded_by_both_planes_of_its_bevels(values) -> None:
+    triangle = laid_down(np.array([28.0, 30.0, 33.0]))
+    wanted = np.reshape(values, (3, 3))
+    wanted[1] = np.minimum(wanted[1], wanted[[0, 2]].mean(axis=0))
+    piece = bevelled(triangle, wanted, 6.0)
+    assert piece.insets(triangle) == pytest.approx(wanted[[0, 2]], abs=1e-9)
+    halves = [bevelled(triangle, wanted[i : i + 2], 3.0).solid.volume for i in (0, 1)]
+    assert piece.solid.volume == pytest.approx(sum(halves))
+    (low, middle, below), (again, high, above) = piece.bevels(triangle)
+    assert (low, middle, again, high) == (-3.0, 0.0, 0.0, 3.0)
+    assert below == pytest.approx((wanted[0] - wanted[1]) / 3)
+    assert above == pytest.approx((wanted[1] - wanted[2]) / 3)
+    for height, row in zip((-3.0, 0.0, 3.0), wanted, strict=True):
+        assert side_insets(triangle, piece.outline(height)) == pytest.approx(row, abs=1e-9)
 
 
 def _area(outline) -> float:

@@ -2,12 +2,11 @@
 
 import numpy as np
 
-from drkid.mesh import Floats
-from drkid.parts.class_triangle import equal_sides
+from drkid.mesh import Floats, Ints
+from drkid.parts.class_triangle import equal_sides, is_equilateral
 from drkid.parts.members import Members
 
 SHARPEST_JOINT_DEGREES = 140.0  # bends beyond this are served as if they were this sharp
-MOST_MIDDLE_INSET = 0.45  # of the thickness: how far a side may stand back from the hinge axis at mid-height
 
 
 def demanded(members: Members, scale: float, thickness_mm: float, swing_degrees: float) -> Floats:
@@ -23,21 +22,60 @@ def demanded(members: Members, scale: float, thickness_mm: float, swing_degrees:
     return scale * members.far[:, None, :] + thickness_mm / 2 * np.stack([high, -low], axis=1)
 
 
-def bisector_insets(demand: Floats, members: Members, class_lengths: Floats) -> Floats:
-    """(k, 2, 3): smallest insets at the inner and outer face that serve all members, shared by equal sides, in mm.
+def bevel_groups(lengths: Floats) -> Ints:
+    """(3,): for each of three ascending side lengths, the number of the group of sides that share its bevel.
 
-    For congruent members this is d(z) = σ* − z·tan φ* with tan φ* = ½(max + min) of tan(δ/2) and
+    Equal sides do, or the piece would lose its mirror image in itself. An equilateral piece keeps one with two sides
+    alike and the third on its own: which of a face's three sides that one meets is then a choice.
+    """
+    return np.array([0, 0, 1]) if is_equilateral(lengths) else equal_sides(lengths)
+
+
+def bisector_insets(demand: Floats, members: Members, class_lengths: Floats) -> Floats:
+    """(k, 2, 3): smallest insets at the inner and outer face that serve all members, shared by `bevel_groups`, in mm.
+
+    For congruent members this is the chord d(z) = σ* − z·tan φ* with tan φ* = ½(max + min) of tan(δ/2) and
     σ* = (t/4)(max − min): an inset that is large enough at both faces is so at every height between. A side never
     stands out over the hinge axis at mid-height.
     """
     insets = np.full((len(class_lengths), 2, 3), -np.inf)
     np.maximum.at(insets, members.face_class, demand)
-    for row, lengths in zip(insets, class_lengths, strict=True):
-        group = equal_sides(lengths)
-        shared = np.stack([row[:, group == g].max(axis=1) for g in range(group[-1] + 1)], axis=1)
-        row[:] = shared[:, group]
+    insets = _shared(insets, class_lengths)
     insets[np.isneginf(insets)] = 0.0  # a class without members
     return insets + np.maximum(-insets.mean(axis=1, keepdims=True), 0.0)
+
+
+def _shared(insets: Floats, class_lengths: Floats) -> Floats:
+    """Insets (k, n, 3) with the largest of each of `bevel_groups`."""
+    groups = np.stack([bevel_groups(lengths) for lengths in class_lengths])
+    together = groups[:, :, None] == groups[:, None, :]
+    return np.where(together[:, None], insets[:, :, None, :], -np.inf).max(axis=3)
+
+
+def flippable_insets(insets_mm: Floats) -> Floats:
+    """Insets (…, 2, 3) with each side's larger one at both faces: the piece is its own image in the middle plane."""
+    return np.repeat(insets_mm.max(axis=-2, keepdims=True), 2, axis=-2)
+
+
+def ridged(insets_mm: Floats, ridge_mm: Floats | float) -> Floats:
+    """(…, 3, 3): insets at the inner face, the middle plane and the outer face, for insets (…, 2, 3) at the faces.
+
+    No bend asks for an inset where the hinge axis lies, at z = 0, so that each side comes back to `ridge_mm` (…, 3)
+    there: d(z) = ridge + 2|z|/t·(inset − ridge), a bevel of two planes, which closes the groove half-way down. Where
+    one plane through both faces' insets stands nearer still, it is kept: the piece stays convex.
+    """
+    middle = np.minimum(insets_mm.mean(axis=-2), ridge_mm)
+    return np.stack([insets_mm[..., 0, :], middle, insets_mm[..., 1, :]], axis=-2)
+
+
+def ridges(members: Members, class_lengths: Floats, scale: float, clearance_mm: float) -> Floats:
+    """(k, 3): how far the sides of each class stand back from the hinge axis at mid-height, in mm.
+
+    Half the clearance, and as far as the mesh's edge lies inside that of a member.
+    """
+    far = np.zeros((len(class_lengths), 3))
+    np.maximum.at(far, members.face_class, scale * members.far)
+    return _shared(far[:, None], class_lengths)[:, 0] + clearance_mm / 2
 
 
 def bevel_insets(bends_degrees: tuple[float, float], thickness_mm: float, swing_degrees: float) -> Floats:
@@ -49,11 +87,11 @@ def bevel_insets(bends_degrees: tuple[float, float], thickness_mm: float, swing_
     return thickness_mm / 2 * np.array([[convex], [concave]])
 
 
-def limited(insets_mm: Floats, deepest_mm: float, thickness_mm: float) -> Floats:
-    """Insets (…, 2, 3) cut down to what leaves the connector its hold.
+def limited(insets_mm: Floats, ridge_mm: Floats, deepest_mm: float, hold_share: float) -> Floats:
+    """Insets (k, 2, 3) at the faces cut down to what leaves the connector its hold.
 
-    No more than `deepest_mm` at either face, and `MOST_MIDDLE_INSET` of the thickness at mid-height.
+    `hold_share` is the part of half the thickness that the connector takes up: within it the bevel, which runs from
+    the ridge (k, 3) at mid-height to the face, stands back by no more than `deepest_mm`.
     """
-    insets = np.minimum(insets_mm, deepest_mm)
-    excess = insets.mean(axis=-2, keepdims=True) - MOST_MIDDLE_INSET * thickness_mm
-    return insets - np.maximum(excess, 0.0)
+    ridge = ridge_mm[:, None, :]
+    return np.minimum(insets_mm, ridge + (deepest_mm - ridge) / hold_share)

@@ -47,6 +47,11 @@ def is_mirror_symmetric(lengths: Floats) -> bool:
     return int(equal_sides(lengths)[-1]) < 2
 
 
+def is_equilateral(lengths: Floats) -> bool:
+    """Whether all three sides of a class are equal, so that its piece can be laid down in three ways."""
+    return int(equal_sides(lengths)[-1]) == 0
+
+
 def symmetries(lengths: Floats) -> list[tuple[tuple[int, ...], Floats]]:
     """The motions, reflections included, that carry a class triangle onto itself.
 

@@ -13,7 +13,7 @@ LEAST_GRIP_MM = 3.0  # how deep a hinge half sits in its pocket behind the barre
 KEY_GRIP_HEIGHTS = 2.0  # how deep a box key sits in its pocket, in heights of the key
 KEY_WALLS = 2.0  # height of a box key in minimum walls
 SHARPEST_KEY_DEGREES = 90.0  # pockets lean by half of this at most: a key that leans more leaves its piece at once
-HOLD_SHARE = 0.25  # of the grip: what no bevel takes away
+HOLD_SHARE = 0.25  # of the least grip: what no bevel takes away
 PLAIN_WALLS = 2.5  # thickness of a piece without pockets in minimum walls
 THICKNESS_STEP_MM = 0.1
 ROUNDING = 1e-9
@@ -132,16 +132,26 @@ def grip_start_mm(barrel_radius_mm: float, knuckle_gap_mm: float, sharpest_degre
     Clear of the other half's barrel (radius r), and behind the plane between the two halves where they come
     nearest: r·tan(δ/2) at the barrel's height when the joint bends by δ.
     """
-    half_bend = radians(min(sharpest_degrees, SHARPEST_JOINT_DEGREES)) / 2
-    return barrel_radius_mm * max(1.0, tan(half_bend)) + knuckle_gap_mm
+    return barrel_radius_mm * max(1.0, _half_tangent(sharpest_degrees)) + knuckle_gap_mm
 
 
 def deepest_bevel_mm(dimensions: Dimensions) -> float:
-    """How far a bevel may cut behind the hinge axis without freeing the connector; infinite where there is none."""
+    """How far a bevel may cut behind the hinge axis, within `held_height_mm` of it, without freeing the connector.
+
+    Infinite where there is none.
+    """
     if dimensions.connector == "none":
         return float("inf")
-    reach = reach_mm(dimensions)
-    return reach - HOLD_SHARE * (reach - dimensions.barrel_diameter_mm / 2)
+    return reach_mm(dimensions) - HOLD_SHARE * max(dimensions.barrel_diameter_mm, LEAST_GRIP_MM)
+
+
+def held_height_mm(dimensions: Dimensions) -> float:
+    """How far from the middle plane a piece must hold its connector: half-way through the wall over the pocket."""
+    return (dimensions.pocket_height_mm + dimensions.min_wall_mm) / 2
+
+
+def _half_tangent(sharpest_degrees: float) -> float:
+    return tan(radians(min(sharpest_degrees, SHARPEST_JOINT_DEGREES)) / 2)
 
 
 def _given(value: float | None, proposal: float) -> float:
@@ -169,22 +179,25 @@ def _cores(spec: KitSpec, given: _Given, sharpest_degrees: float) -> Iterator[_C
         pin = PIN_WALLS * given.wall
         across = SNAP_PLACES * (2 * wall + 2 * gap + length) + gap
         barrel = pin + 2 * given.rod_clearance + 2 * wall
-        yield _Core(barrel, *_grip(barrel, wall, gap, sharpest_degrees, across), pin_mm=pin)
+        yield _Core(barrel, *_grip(barrel, wall, across, gap, given, sharpest_degrees), pin_mm=pin)
     else:
         for rod in _rods_mm(spec, given.rod_clearance):
             barrel = rod + 2 * given.rod_clearance + 2 * given.knuckle_wall
             for n in KNUCKLES if spec.knuckles is None else (spec.knuckles,):
                 across = n * length + (n - 1) * gap
-                grip = _grip(barrel, given.knuckle_wall, gap, sharpest_degrees, across)
+                grip = _grip(barrel, given.knuckle_wall, across, gap, given, sharpest_degrees)
                 yield _Core(barrel, *grip, rod_mm=rod, knuckles=n)
 
 
 def _grip(
-    barrel_mm: float, wall_mm: float, gap_mm: float, sharpest_degrees: float, across_mm: float
+    barrel_mm: float, wall_mm: float, across_mm: float, gap_mm: float, given: _Given, sharpest_degrees: float
 ) -> tuple[float, float, float]:
     """Reach, length along the edge and start of the full width of a half around a barrel."""
     start = grip_start_mm(barrel_mm / 2, gap_mm, sharpest_degrees)
-    return max(barrel_mm / 2 + max(barrel_mm, LEAST_GRIP_MM), start + wall_mm), across_mm, start
+    least = max(barrel_mm, LEAST_GRIP_MM)
+    roof = barrel_mm / 2 + given.clearance + given.wall / 2  # see held_height_mm
+    held = roof * _half_tangent(sharpest_degrees) + HOLD_SHARE * least
+    return max(barrel_mm / 2 + least, start + wall_mm, held), across_mm, start
 
 
 def _thickness_mm(spec: KitSpec, pocket_height_mm: float, wall_mm: float) -> float:

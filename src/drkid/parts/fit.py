@@ -17,7 +17,7 @@ from drkid.parts.prismoid import Prismoid, side_insets
 SCALE_TOLERANCE = 1e-5  # relative: the size is rounded up to whole mm afterwards
 SCALE_STEP = 1.5
 MOST_STEPS = 60
-LEAST_MM = 1e-6  # between corners of a pocket's outline, so that every side of it has a direction
+LEAST_MM = 1e-3  # a pocket that a bevel cuts off altogether counts as one so deep; so does a groove
 FITS_MM = -1e-6  # slack that still counts as fitting: a size that was computed fits again when it is given
 
 
@@ -39,7 +39,7 @@ def margins(triangle: Floats, prismoid: Prismoid, dimensions: Dimensions) -> Ite
     """Every length of a piece that must not fall short: triangle (3, 2), the piece around it, its pockets.
 
     Exact: pockets are convex polygons at every height, and the distances between them and to the bevels change
-    linearly between the pockets' roof and the inner face.
+    linearly between the inner face, the bevels' ridge and the pockets' roof.
     """
     low, high = prismoid.heights_mm
     least = max(dimensions.min_wall_mm, dimensions.thickness_mm / 2)
@@ -48,15 +48,17 @@ def margins(triangle: Floats, prismoid: Prismoid, dimensions: Dimensions) -> Ite
     if dimensions.connector == "none":
         return
     wall = dimensions.min_wall_mm
-    insets = prismoid.insets(triangle)
-    slope = (insets[0] - insets[1]) / dimensions.thickness_mm
-    for height in _telling_heights(dimensions, low):
+    levels = prismoid.levels_mm[prismoid.levels_mm < dimensions.pocket_height_mm / 2].tolist()
+    for height in sorted({*levels, *_telling_heights(dimensions, low)}):
         outline = prismoid.outline(height)
         pockets = pocket_outlines(triangle, outline, dimensions, height)
         between = min(convex_distance(pockets[i], pockets[i - 1]) for i in range(3))
         yield Margin("wall between two pockets", wall, between)
         across = _bevel_distance(pockets, outline)
-        yield Margin("wall between pocket and bevel", wall, _nearest(across, slope, height - low, high - height))
+        for bottom, top, slope in prismoid.bevels(triangle):
+            if bottom <= height <= top:
+                distance = _nearest(across, slope, height - bottom, top - height)
+                yield Margin("wall between pocket and bevel", wall, distance)
 
 
 def _telling_heights(dimensions: Dimensions, low: float) -> tuple[float, ...]:

@@ -33,14 +33,15 @@ class Members:
     normals: Floats
 
 
-def members_of(decomposition: Decomposition) -> Members:
+def members_of(decomposition: Decomposition, turned: Ints | int = 0) -> Members:
     """How every face uses its class: handedness by the cyclic order of its sides, turn by least mismatch.
 
-    Equal sides share one bevel, so that no turn of an equilateral piece serves a narrower range than another.
+    An equilateral piece fits its face in three ways; `turned` (F,) says by how many sides more to turn each.
     """
     mesh, face_class = decomposition.mesh, decomposition.face_class
     lengths = _symmetrised(decomposition.class_lengths)
     left, turn = _laid(mesh.side_lengths, lengths, face_class)
+    turn = (turn + turned) % 3
     face_side = (np.where(left[:, None], LEFT_SIDES, (0, 1, 2)) + turn[:, None]) % 3
     face_corner = (np.where(left[:, None], LEFT_CORNERS, (0, 1, 2)) + turn[:, None]) % 3
     corners, rotation = _fitted(np.take_along_axis(mesh.side_lengths, face_side, 1), lengths[face_class])

@@ -1,6 +1,8 @@
 """Prismoid: a triangle with thickness, its sides bevelled."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -11,10 +13,23 @@ from drkid.solid import Solid
 
 @dataclass(frozen=True, eq=False)
 class Prismoid:
-    """The convex hull of two triangles: `faces` (2, 3, 2) at z = −thickness_mm/2 and +thickness_mm/2."""
+    """The convex hull of `outlines` (n, 3, 2), spaced evenly from −thickness_mm/2 to +thickness_mm/2.
 
-    faces: Floats
+    Two outlines make plane bevels, three make bevels with a ridge along the middle plane.
+    """
+
+    outlines: Floats
     thickness_mm: float
+
+    @property
+    def faces(self) -> Floats:
+        """(2, 3, 2): the inner and the outer face."""
+        return self.outlines[[0, -1]]
+
+    @property
+    def levels_mm(self) -> Floats:
+        """(n,): the height of each outline."""
+        return np.linspace(-0.5, 0.5, len(self.outlines)) * self.thickness_mm
 
     @property
     def heights_mm(self) -> tuple[float, float]:
@@ -24,17 +39,28 @@ class Prismoid:
     @property
     def solid(self) -> Solid:
         """The piece without pockets."""
-        points = [np.column_stack([f, np.full(3, z)]) for f, z in zip(self.faces, self.heights_mm, strict=True)]
+        points = [np.column_stack([f, np.full(3, z)]) for f, z in zip(self.outlines, self.levels_mm, strict=True)]
         return Solid.hull(np.vstack(points))
 
     def outline(self, height_mm: float) -> Floats:
         """(3, 2): corners of the section at a height (a twisted side bulges over it, never stays behind)."""
-        share = height_mm / self.thickness_mm + 0.5
-        return (1 - share) * self.faces[0] + share * self.faces[1]
+        below = int(np.clip(np.searchsorted(self.levels_mm, height_mm) - 1, 0, len(self.outlines) - 2))
+        low, high = self.levels_mm[below : below + 2]
+        share = (height_mm - low) / (high - low)
+        return (1 - share) * self.outlines[below] + share * self.outlines[below + 1]
 
     def insets(self, triangle: Floats) -> Floats:
         """(2, 3): how far each side of either face stands inside the class triangle's (3, 2), at the nearer end."""
         return np.stack([side_insets(triangle, face) for face in self.faces])
+
+    def bevels(self, triangle: Floats) -> Iterator[tuple[float, float, Floats]]:
+        """The planes of the bevels from below: lowest and highest height, and by how much a mm of height opens each.
+
+        That is (3,), how much farther out a side stands at the top of a mm than at its bottom.
+        """
+        insets = [side_insets(triangle, outline) for outline in self.outlines]
+        for (low, below), (high, above) in pairwise(zip(self.levels_mm.tolist(), insets, strict=True)):
+            yield low, high, (below - above) / (high - low)
 
 
 def side_insets(triangle: Floats, outline: Floats) -> Floats:
@@ -44,10 +70,10 @@ def side_insets(triangle: Floats, outline: Floats) -> Floats:
 
 
 def bevelled(triangle: Floats, insets_mm: Floats, thickness_mm: float) -> Prismoid:
-    """The prismoid whose faces' sides stand `insets_mm` (2, 3) inside those of the class triangle (3, 2)."""
+    """The prismoid whose outlines' sides stand `insets_mm` (n, 3) inside those of the class triangle (3, 2)."""
     normal = inward_normals(triangle)
     level = np.einsum("sk,sk->s", normal, triangle) + insets_mm
     systems = np.stack([np.roll(normal, 1, axis=0), normal], axis=1)  # corner i: sides i − 1 and i meet
     levels = np.stack([np.roll(level, 1, axis=1), level], axis=-1)
-    faces = np.linalg.solve(systems[None], levels[..., None])[..., 0]
-    return Prismoid(read_only(faces.astype(np.float64)), thickness_mm)
+    outlines = np.linalg.solve(systems[None], levels[..., None])[..., 0]
+    return Prismoid(read_only(outlines.astype(np.float64)), thickness_mm)
