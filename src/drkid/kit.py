@@ -16,6 +16,7 @@ VolumeKind = Literal["labels", "mask", "density"]
 Handedness = Literal["any", "left", "right"]
 Status = Literal["converged", "stalled"]
 Firmness = Literal["stiff", "soft", "may snap through"]
+Verdict = Literal["closes", "closes with strain", "does not close"]
 
 
 def class_id(index: int) -> str:
@@ -243,6 +244,106 @@ class Step:
     joins: tuple[int, ...]
 
 
+@dataclass(frozen=True)
+class Gaps:
+    """How far the two axes of a hinge lie apart at the hinge's ends, over all hinges, in mm."""
+
+    mean_mm: float
+    p95_mm: float
+    max_mm: float
+
+
+@dataclass(frozen=True)
+class Drift:
+    """How far the corners of the joined parts lie from M_f's vertices after a rigid fit; percent of M_f's diagonal."""
+
+    mean_mm: float
+    max_mm: float
+    mean_percent: float
+    max_percent: float
+
+
+@dataclass(frozen=True)
+class ToleranceBudget:
+    """What a joint needs and has, in mm, at the joint most at risk, between `joint`'s two faces.
+
+    `slip_mm` and `rod_mm` are the play of both halves in their pockets and around the rod. `gap_mm` is what the
+    classes' errors open there, `scatter_mm` what 95 of 100 prints stay below that scatter by `accuracy_mm`.
+    `reserve_mm` is what is left. `shared_mm` is the most that errors of `accuracy_mm` that all pieces of a mould share
+    open at any joint, again of 95 in 100.
+    """
+
+    slip_mm: float
+    rod_mm: float
+    accuracy_mm: float
+    joint: tuple[int, int]
+    gap_mm: float
+    scatter_mm: float
+    reserve_mm: float
+    shared_mm: float
+
+
+@dataclass(frozen=True)
+class Closure:
+    """Whether the printed parts, joined by their hinges alone, make the closed shell.
+
+    `chain` are the gaps of parts put one to the next at the stated dihedral angles, `gaps` those after relaxation,
+    which took `iterations` and `settled` if it came to rest.
+    """
+
+    verdict: Verdict
+    play_mm: float
+    gaps: Gaps
+    chain: Gaps
+    drift: Drift
+    budget: ToleranceBudget
+    iterations: int
+    settled: bool
+
+
+@dataclass(frozen=True)
+class Swing:
+    """How far hinges turn from their place before the pieces' bevels touch, in degrees; negative: they touch there.
+
+    `inward_degrees` and `outward_degrees` are the least over all joints, towards a more convex and a more concave
+    shell; `blocked` counts joints that cannot turn by the asked `wanted_degrees` both ways.
+    """
+
+    wanted_degrees: float
+    inward_degrees: float
+    outward_degrees: float
+    blocked: int
+
+
+@dataclass(frozen=True)
+class Building:
+    """What the order of building is like; lengths in mm.
+
+    `border_mean_mm` and `border_max_mm` are of the open border over the steps, `breadth_first_mean_mm` its mean in a
+    breadth-first order. `enclosed` counts pieces before the last that go in between neighbours on every side,
+    `bridges` those that close the shell around a hole. The last piece goes in along its normal unless it overlaps the
+    placed ones by `last_overlap_percent` of its volume; `last_candidates` were tried.
+    """
+
+    border_mean_mm: float
+    border_max_mm: float
+    breadth_first_mean_mm: float
+    enclosed: int
+    bridges: int
+    last_goes_in: bool
+    last_overlap_percent: float
+    last_candidates: int
+
+
+@dataclass(frozen=True)
+class AssemblyFigures:
+    """Whether and how the kit goes together."""
+
+    closure: Closure
+    swing: Swing
+    building: Building
+
+
 @dataclass(frozen=True, eq=False)
 class Assembly:
     """Pieces in the order of faces, joints in the order of edges, steps in the order of building."""
@@ -250,6 +351,8 @@ class Assembly:
     pieces: tuple[Piece, ...]
     joints: tuple[Joint, ...]
     steps: tuple[Step, ...]
+    figures: AssemblyFigures
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -284,6 +387,7 @@ class Metrics:
     iterations: int
     rigidity: Rigidity | None = None
     seconds: dict[str, float] = field(default_factory=dict)
+    assembly: AssemblyFigures | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -69,7 +69,7 @@ def make_kit(source: str | Path | None = None, spec: KitSpec | None = None, prog
     scale = part_set.scale_mm_per_unit
     printed = _scaled(decomposition, scale)
     with stage("assembly") as told:
-        assembly = assemble(printed.mesh, part_set, told)
+        assembly = assemble(printed.mesh, part_set, told, spec)
     with stage("measure"):
         surfaces = surface.mesh.scaled(scale), simplified.mesh.scaled(scale)
         metrics = measure_kit(*surfaces, printed, part_set, {})
@@ -81,7 +81,7 @@ def make_kit(source: str | Path | None = None, spec: KitSpec | None = None, prog
         decomposition=printed,
         part_set=part_set,
         assembly=assembly,
-        metrics=replace(metrics, seconds=seconds),
+        metrics=replace(metrics, seconds=seconds, assembly=assembly.figures),
         notes=(
             *surface.notes,
             *simplified.notes,
@@ -89,6 +89,7 @@ def make_kit(source: str | Path | None = None, spec: KitSpec | None = None, prog
             *part_set.notes,
             *size_notes(spec, printed.mesh),
             *_crossings(printed),
+            *assembly.notes,
         ),
         writer=write_kit,
     )

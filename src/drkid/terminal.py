@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from drkid.inspection import Inspection
-    from drkid.kit import Kit, Rigidity
+    from drkid.kit import AssemblyFigures, Kit, Rigidity
     from drkid.verification import Verification
 
 MOST_ROWS = 30  # of labels or components that a table shows
@@ -98,6 +98,7 @@ def show_kit(kit: "Kit", folder: "Path", seconds: float) -> None:
         "size": f"{size} mm, edges {metrics.mean_edge:.1f} mm, {kit.part_set.dimensions.thickness_mm:g} mm thick",
         "grooves": f"{metrics.groove_mean_mm:.2g} mm mean, {metrics.groove_max_mm:.2g} mm max",
         "rigidity": _rigidity(metrics.rigidity, metrics.mean_edge),
+        "assembly": _assembly(metrics.assembly),
         "solver": f"{outcome.status}: {outcome.message}",
         "time": f"{seconds:.1f} s",
         "kit": str(folder),
@@ -116,6 +117,18 @@ def _rigidity(found: "Rigidity | None", mean_edge_mm: float) -> str:
             f" behind {found.barrier_percent / 100 * mean_edge_mm:.2g} mm of play"
         )
     return text
+
+
+def _assembly(found: "AssemblyFigures | None") -> str:
+    """The verdict, the figures that bear it out, and how the last piece goes in."""
+    if found is None:
+        return "not tried"
+    closure, building = found.closure, found.building
+    last = "the last piece goes in" if building.last_goes_in else "no piece goes in last"
+    return (
+        f"{closure.verdict}: gaps up to {closure.gaps.max_mm:.2g} of {closure.play_mm:.2g} mm, "
+        f"drift {closure.drift.max_percent:.2g} % of the box; {last}"
+    )
 
 
 def _error(largest_percent: float, mean_percent: float) -> str:

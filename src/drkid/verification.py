@@ -14,15 +14,20 @@ from drkid.errors import KitFolderError
 from drkid.export import KitDocument
 from drkid.export.layout import ASSEMBLED, BOM_CSV, BOM_JSON, KIT_JSON, PIECE_CLASS, SIMPLIFIED, SURFACE
 from drkid.intersection import self_intersections
+from drkid.kit import Building, Closure, Swing
 from drkid.measure import bend_radians, dihedral
 from drkid.mesh import Floats, Ints, TriMesh
 from drkid.metrics import surface_distances
+from drkid.printed import structure_of
 from drkid.solid import Solid
 
 RELATIVE = 1e-6  # of a recomputed length: PLY and JSON keep full double precision
 DISTANCE_PERCENT = 0.02  # of the diagonal: what two samplings of a surface may differ by
 PLACEMENT_OF_ERROR = 1.5  # a corner may miss its vertex by so many times the largest class error
 PLACEMENT_MM = 0.02
+PRINTED_MM = 1e-4  # between corners and stated lengths: single precision in the STL files is no better
+ASSEMBLED_MM, ASSEMBLED_SHARE = 1e-3, 0.01  # what a relaxation that is begun from rounded figures may differ by
+SWING_DEGREES = 0.1  # a corner in single precision, seen from an axis a fraction of a mm away
 SINGULAR_VALUE = 1e-6  # of the rigidity matrix: below it is rounding, a square root of it
 
 
@@ -73,7 +78,9 @@ def verify_kit(folder: str | Path) -> Verification:
         _counts(face_class, kit),
         _placement(assembled, kit),
         _order(assembled, kit),
+        *_corners_and_lengths(kit),
         _parts(folder, kit),
+        *_together(folder, assembled, kit),
         _parts_list(folder, kit),
     )
     return Verification(folder, checks)
@@ -250,6 +257,96 @@ def _parts(folder: Path, kit: KitDocument) -> Check:
             continue
         bad += [] if solid.volume > 0 else [f"{name} has no volume"]
     return Check("parts are solids", not bad, "; ".join(bad) or f"{len(files)} files")
+
+
+def _corners_and_lengths(kit: KitDocument) -> list[Check]:
+    """A part's corners are as far apart as its class says."""
+    off = 0.0
+    for one in kit.classes:
+        for part in one.parts:
+            corners = np.array(part.corners)
+            sides = np.sort(np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1))
+            same = len(sides) == len(one.edge_lengths)
+            off = max(off, float(np.abs(sides - one.edge_lengths).max()) if same else np.inf)
+    right = off <= PRINTED_MM
+    return [Check("corners of the parts", right, f"sides within {off:.2g} mm of their classes' lengths")]
+
+
+def _together(folder: Path, mesh: TriMesh, kit: KitDocument) -> list[Check]:
+    """The virtual assembly from the files, against what the kit states; unstated, it must go together."""
+    try:
+        structure = structure_of(folder, mesh, kit)
+    except ValueError as error:
+        return [Check("virtual assembly", passed=False, detail=str(error))]
+    closure = structure.joining().closure
+    swing = structure.swinging(float(kit.spec["swing_degrees"]))
+    order = [structure.faces.index(step.face) for step in kit.assembly if step.face in structure.faces]
+    if sorted(order) != list(range(len(structure.parts))):
+        return [_closes(closure, kit), Check("building", passed=False, detail="the order is not one of all pieces")]
+    last = structure.insertion(float(kit.spec["thickness_mm"]), order[-1:])
+    return [
+        _closes(closure, kit),
+        *_closure(closure, kit),
+        _swings(swing, kit),
+        _builds(structure.building(order, last), kit),
+    ]
+
+
+def _closes(closure: Closure, kit: KitDocument) -> Check:
+    stated = kit.metrics.assembly
+    agrees = closure.verdict == stated.closure.verdict if stated else closure.verdict != "does not close"
+    return Check(
+        "virtual assembly",
+        agrees,
+        f"{closure.verdict}: gaps {closure.gaps.mean_mm:.2g} mm mean, {closure.gaps.p95_mm:.2g} p95, "
+        f"{closure.gaps.max_mm:.2g} max, play {closure.play_mm:.2g}; before relaxation {closure.chain.max_mm:.2g}",
+    )
+
+
+def _closure(closure: Closure, kit: KitDocument) -> list[Check]:
+    budget, drift = closure.budget, closure.drift
+    told = (
+        f"joint {budget.joint[0]}–{budget.joint[1]} most at risk: {budget.slip_mm:.2g} mm slip + {budget.rod_mm:.2g} "
+        f"rod − {budget.gap_mm:.2g} class error − {budget.scatter_mm:.2g} manufacturing = {budget.reserve_mm:.2g} mm"
+    )
+    shape = f"{drift.mean_mm:.2g} mm mean, {drift.max_mm:.2g} max: {drift.max_percent:.2g} % of the box"
+    if kit.metrics.assembly is None:
+        return [Check("drift", passed=True, detail=shape), Check("tolerance budget", passed=True, detail=told)]
+    stated = kit.metrics.assembly.closure
+    return [
+        Check("drift", _near(stated.drift.max_mm, drift.max_mm), f"{shape}, stated {stated.drift.max_mm:.2g} mm"),
+        Check("tolerance budget", _near(stated.budget.reserve_mm, budget.reserve_mm), told),
+    ]
+
+
+def _swings(swing: Swing, kit: KitDocument) -> Check:
+    told = (
+        f"{swing.inward_degrees:.2f}° inwards, {swing.outward_degrees:.2f}° outwards at the tightest joints, "
+        f"{swing.blocked} have less than {swing.wanted_degrees:g}°"
+    )
+    stated = kit.metrics.assembly
+    right = stated is None or (
+        abs(stated.swing.inward_degrees - swing.inward_degrees) < SWING_DEGREES
+        and abs(stated.swing.outward_degrees - swing.outward_degrees) < SWING_DEGREES
+    )
+    return Check("swing of the joints", right, told)
+
+
+def _builds(building: Building, kit: KitDocument) -> Check:
+    told = (
+        f"open border {building.border_mean_mm:.0f} mm mean, {building.border_max_mm:.0f} max "
+        f"(breadth-first {building.breadth_first_mean_mm:.0f} mean); {building.enclosed} pieces enclosed; last piece "
+        f"{'goes in' if building.last_goes_in else 'does not go in'}, meets {building.last_overlap_percent:.2g} %"
+    )
+    stated = kit.metrics.assembly
+    if stated is None:
+        return Check("building", building.last_goes_in, told)
+    same = stated.building.last_goes_in == building.last_goes_in and stated.building.enclosed == building.enclosed
+    return Check("building", same and _near(stated.building.border_mean_mm, building.border_mean_mm), told)
+
+
+def _near(stated_mm: float, found_mm: float) -> bool:
+    return abs(stated_mm - found_mm) <= max(ASSEMBLED_MM, ASSEMBLED_SHARE * abs(found_mm))
 
 
 def _parts_list(folder: Path, kit: KitDocument) -> Check:

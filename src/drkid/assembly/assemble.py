@@ -1,21 +1,29 @@
 """The one function of this stage."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from drkid.assembly.closure import Play
 from drkid.assembly.order import steps
+from drkid.assembly.piece_graph import piece_graph
 from drkid.assembly.rigid_fit import rigid_fit
-from drkid.kit import Assembly, Joint, PartSet, Piece
+from drkid.assembly.structure import Shape, Structure
+from drkid.kit import Assembly, AssemblyFigures, Building, Closure, Dimensions, Joint, PartSet, Piece, Swing
 from drkid.measure import bend_radians
 from drkid.mesh import TriMesh, read_only
 from drkid.progress import Progress, silent
+from drkid.spec import KitSpec
+
+PLAIN = KitSpec()
 
 
-def assemble(mesh_mm: TriMesh, part_set: PartSet, progress: Progress = silent) -> Assembly:
-    """Every part at its face of the connected closed mesh M_f in mm, the joints between them, and a building order.
+def assemble(mesh_mm: TriMesh, part_set: PartSet, progress: Progress = silent, spec: KitSpec = PLAIN) -> Assembly:
+    """Every part at its face of the connected closed mesh M_f in mm, the joints, a building order, and the proofs.
 
     A piece's transform is the rigid motion that carries its part's corners nearest to the face's: what remains is
     the difference between the face and its class. Joints are in the order of `mesh_mm.edges`; their angle is the
-    inner dihedral, 180° less the bend.
+    inner dihedral, 180° less the bend. Process and swing are the `spec`'s.
     """
     progress("placing pieces", 0.0)
     turned = (np.arange(3) + part_set.face_turn[:, None]) % 3
@@ -33,7 +41,83 @@ def assemble(mesh_mm: TriMesh, part_set: PartSet, progress: Progress = silent) -
             mesh_mm.edge_faces.tolist(), mesh_mm.edges.tolist(), np.degrees(bend), strict=True
         )
     )
-    progress("ordering pieces", 0.5)
-    order = steps(mesh_mm, bend)
+    structure = Structure(
+        graph=piece_graph([piece.vertices for piece in pieces], mesh_mm.edges.tolist()),
+        shapes=[Shape(part.corners, part.side_frames, part.solid) for part in part_set.parts],
+        parts=[piece.part for piece in pieces],
+        faces=[piece.face for piece in pieces],
+        placements=transforms,
+        targets=[mesh_mm.vertices[list(piece.vertices)] for piece in pieces],
+        bend_radians=bend,
+        connector=part_set.dimensions.connector,
+        connectors=[connector.solid for connector in part_set.connectors],
+        hinge_mm=part_set.dimensions.rod_length_mm,
+        play=_play(part_set.dimensions, spec),
+    )
+    return _proven(structure, pieces, joints, part_set.dimensions, spec, progress)
+
+
+def _proven(
+    structure: Structure,
+    pieces: tuple[Piece, ...],
+    joints: tuple[Joint, ...],
+    dimensions: Dimensions,
+    spec: KitSpec,
+    progress: Progress,
+) -> Assembly:
+    progress("joining pieces by their hinges", 0.2)
+    closure = structure.joining().closure
+    swing = structure.swinging(spec.swing_degrees)
+    progress("choosing the last piece", 0.6)
+    last = structure.insertion(dimensions.thickness_mm, structure.by_convexity())
+    progress("ordering pieces", 0.8)
+    order = structure.order(last.piece)
+    building = structure.building(order, last)
     progress("ordering pieces", 1.0)
-    return Assembly(pieces, joints, order)
+    return Assembly(
+        pieces,
+        joints,
+        steps(structure.graph, order, structure.faces),
+        AssemblyFigures(closure, swing, building),
+        (*_closure_notes(closure), *_swing_notes(swing), *_building_notes(building, structure.faces[last.piece])),
+    )
+
+
+def _play(dimensions: Dimensions, spec: KitSpec) -> Play:
+    """Both halves slip in their pockets; what turns has play around its rod or pin too."""
+    rod = 2 * dimensions.rod_clearance_mm if dimensions.connector in {"hinge", "snap"} else 0.0
+    return Play(2 * dimensions.clearance_mm, rod, spec.preset.accuracy_mm)
+
+
+def _closure_notes(closure: Closure) -> Iterator[str]:
+    budget = closure.budget
+    if closure.verdict != "closes":
+        yield (
+            f"Joined by their hinges alone the pieces leave gaps of up to {closure.gaps.max_mm:.2f} mm, where the "
+            f"pockets give {closure.play_mm:.2f} mm: it {closure.verdict}. A smaller --tolerance-percent, the palette "
+            "solver or a larger --clearance-mm helps."
+        )
+    if budget.reserve_mm < 0:
+        yield (
+            f"Manufacturing may open the joint of faces {budget.joint[0]} and {budget.joint[1]} by "
+            f"{-budget.reserve_mm:.2f} mm more than its play: print more exactly, or take a larger --clearance-mm."
+        )
+
+
+def _swing_notes(swing: Swing) -> Iterator[str]:
+    if swing.blocked:
+        yield (
+            f"{swing.blocked} joints cannot turn by {swing.wanted_degrees:g}° both ways; the tightest has "
+            f"{min(swing.inward_degrees, swing.outward_degrees):.1f}°."
+        )
+
+
+def _building_notes(building: Building, face: int) -> Iterator[str]:
+    if not building.last_goes_in:
+        yield (
+            f"No piece goes in last along its normal; the best of {building.last_candidates}, that of face {face}, "
+            f"meets {building.last_overlap_percent:.2g} % of its volume: bend the open shell apart to let it in, or "
+            "take a larger --swing-degrees, thinner pieces or more --faces."
+        )
+    if building.enclosed:
+        yield f"{building.enclosed} pieces before the last go in between neighbours on all sides."

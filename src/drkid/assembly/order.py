@@ -1,86 +1,144 @@
-"""Order of building: a shell that grows with a short border and is closed by a piece that goes in from outside."""
+"""Order of building: a shell that grows with a short open border and without holes, up to a given last piece.
+
+On a surface without handles every piece but the last can be added along one unbroken stretch of its outline, so that
+what stands and what is missing stay one patch each (a shelling; triangulated spheres and discs can be shelled whatever
+the beginning: Danaraj and Klee 1978). No piece then has to be squeezed in between neighbours on all sides.
+"""
 
 import heapq
 from collections import deque
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from drkid.assembly.piece_graph import PieceGraph
 from drkid.kit import Step
-from drkid.mesh import Floats, TriMesh
+from drkid.mesh import Floats
 
-SAME_BEND = 1e-6  # radians: bends that differ by less are equal, so that rounding does not choose
+Waiting = Callable[[int, int], float]
+"""How long a piece should wait: of the piece, and of its number in the order in which the border met it."""
+
+ROUNDING = 1e-9  # of a mean side: borders that differ by less are equal, so that rounding does not choose
 
 
-def steps(mesh: TriMesh, bend_radians: Floats) -> tuple[Step, ...]:
-    """Every face once, each after the first beside one that stands; `joins` are all its neighbours that stand.
+def order(graph: PieceGraph, lengths: Floats, last: int) -> tuple[int, ...]:
+    """Every piece once, each after the first beside one that stands, `last` at the end; `lengths` (J,) of the joints.
 
-    The last is the face whose least convex joint (E,) is the most convex: its neighbours do not lean over it, so it
-    can be put in along its normal. Building begins as far from it as possible; next comes the face with the most
-    standing neighbours, of those the one whose corners lack the fewest other faces, and the longest waiting.
+    Grown from the piece farthest from the last one. Next comes the piece that touches what stands along one stretch,
+    lengthens the border least, and has a corner that lacks the fewest other pieces. What is left of the choice is
+    made in several ways, and that order is taken whose border is shortest on average.
     """
-    neighbours = _neighbours(mesh)
-    last = _most_convex(mesh, bend_radians)
-    order = _grown(mesh, neighbours, _farthest(neighbours, last), last)
-    rank = {face: i for i, face in enumerate(order)}
+    first = breadth_first(graph, last)[-1]
+    depth = _depths(graph, first)
+    ways: tuple[Waiting, ...] = (lambda _, met: met, lambda _, met: -met, lambda piece, _: depth[piece])
+    mean = float(lengths.mean())
+    found = [_grown(graph, lengths, first, last, way) for way in ways]
+    return min(found, key=lambda one: round(float(border_lengths(graph, lengths, one).mean()) / mean / ROUNDING))
+
+
+def steps(graph: PieceGraph, pieces: Sequence[int], faces: Sequence[int]) -> tuple[Step, ...]:
+    """The order of `pieces` as steps: each names a face of its piece, `faces[p]`, and those of the standing ones."""
+    rank = {piece: i for i, piece in enumerate(pieces)}
     return tuple(
-        Step(face, tuple(sorted({int(n) for n in neighbours[face] if rank[int(n)] < i})))
-        for i, face in enumerate(order)
+        Step(faces[p], tuple(sorted({faces[n] for n in graph.neighbours[p] if n >= 0 and rank[n] < i})))
+        for i, p in enumerate(pieces)
     )
 
 
-def _neighbours(mesh: TriMesh) -> list[list[int]]:
-    pairs = mesh.edge_faces[mesh.face_edges]
-    own = np.arange(len(mesh.faces))[:, None]
-    return np.where(pairs[..., 0] == own, pairs[..., 1], pairs[..., 0]).tolist()
+def breadth_first(graph: PieceGraph, first: int) -> tuple[int, ...]:
+    """The pieces as breadth-first search from `first` meets them."""
+    return tuple(_depths(graph, first))
 
 
-def _most_convex(mesh: TriMesh, bend_radians: Floats) -> int:
-    least = np.round(bend_radians[mesh.face_edges].min(axis=1) / SAME_BEND)
-    return int(np.argmax(least))
+def border_lengths(graph: PieceGraph, lengths: Floats, pieces: Sequence[int]) -> Floats:
+    """(P,): length of the open border after each step; `lengths` (J,) of the joints."""
+    step = np.argsort(np.asarray(pieces))
+    pair = np.sort(step[graph.pieces], axis=1)
+    change = np.zeros(len(pieces) + 1)
+    np.add.at(change, pair[:, 0], lengths)
+    np.subtract.at(change, pair[:, 1], lengths)
+    return np.cumsum(change)[:-1]
 
 
-def _farthest(neighbours: list[list[int]], start: int) -> int:
-    """The face that breadth-first search from `start` meets last."""
-    seen, queue, face = {start}, deque([start]), start
+def stretches(graph: PieceGraph, pieces: Sequence[int]) -> list[tuple[int, int]]:
+    """For each step: on how many of its sides the piece meets standing ones, and in how many unbroken stretches.
+
+    A corner at which others stand, though neither side beside it does, is a stretch too: the shell closes around a
+    hole there.
+    """
+    standing, corners, found = set[int](), set[int](), list[tuple[int, int]]()
+    for piece in pieces:
+        found.append(_touch(graph, piece, standing, corners))
+        standing.add(piece)
+        corners.update(graph.outlines[piece])
+    return found
+
+
+def _touch(graph: PieceGraph, piece: int, standing: set[int] | dict[int, None], corners: set[int]) -> tuple[int, int]:
+    sides = [n in standing for n in graph.neighbours[piece]]
+    begun = sum(here and not sides[i - 1] for i, here in enumerate(sides))
+    lone = sum(vertex in corners and not (sides[i] or sides[i - 1]) for i, vertex in enumerate(graph.outlines[piece]))
+    return sum(sides), (1 if all(sides) else begun) + lone
+
+
+def _depths(graph: PieceGraph, first: int) -> dict[int, int]:
+    depth, queue = {first: 0}, deque([first])
     while queue:
-        face = queue.popleft()
-        fresh = [n for n in neighbours[face] if n not in seen]
-        seen.update(fresh)
-        queue.extend(fresh)
-    return face
+        piece = queue.popleft()
+        for other in graph.neighbours[piece]:
+            if other >= 0 and other not in depth:
+                depth[other] = depth[piece] + 1
+                queue.append(other)
+    return depth
 
 
-def _grown(mesh: TriMesh, neighbours: list[list[int]], first: int, last: int) -> list[int]:
+def _grown(graph: PieceGraph, lengths: Floats, first: int, last: int, way: Waiting) -> tuple[int, ...]:
     """Greedy growth by a priority queue; entries that have been overtaken are passed over."""
-    corners, around = mesh.faces.tolist(), _faces_at(mesh)
-    missing = mesh.valence.tolist()
+    around = _pieces_at(graph)
+    missing = {vertex: len(pieces) for vertex, pieces in around.items()}
+    growth, mean = _side_lengths(graph, lengths), float(lengths.mean())
     standing: dict[int, None] = {}
-    waiting = {first: 0}
+    corners: set[int] = set()
+    met = {first: 0}
 
-    def entry(face: int) -> tuple[bool, int, int, int, int]:
-        beside = sum(n in standing for n in neighbours[face])
-        return face == last, -beside, min(missing[v] for v in corners[face]), waiting[face], face
+    def entry(piece: int) -> tuple[bool, bool, int, int, float, int]:
+        _, parts = _touch(graph, piece, standing, corners)
+        longer = sum(
+            -length if n in standing else length
+            for n, length in zip(graph.neighbours[piece], growth[piece], strict=True)
+        )
+        fewest = min(missing[v] for v in graph.outlines[piece])
+        return piece == last, parts > 1, round(2 * longer / mean), fewest, way(piece, met[piece]), piece
 
     queue = [entry(first)]
     while queue:
         current = heapq.heappop(queue)
-        face = current[-1]
-        if face in standing or current != entry(face):
+        piece = current[-1]
+        if piece in standing or current != entry(piece):
             continue
-        standing[face] = None
-        for vertex in corners[face]:
+        standing[piece] = None
+        corners.update(graph.outlines[piece])
+        for vertex in graph.outlines[piece]:
             missing[vertex] -= 1
-        for n in neighbours[face]:
-            waiting.setdefault(n, len(waiting))
-        for n in {n for vertex in corners[face] for n in around[vertex]}:
-            if n in waiting and n not in standing:
+        for n in graph.neighbours[piece]:
+            met.setdefault(n, len(met))
+        for n in {n for vertex in graph.outlines[piece] for n in around[vertex]}:
+            if n in met and n not in standing:
                 heapq.heappush(queue, entry(n))
-    return list(standing)
+    return tuple(standing)
 
 
-def _faces_at(mesh: TriMesh) -> list[list[int]]:
-    around: list[list[int]] = [[] for _ in mesh.vertices]
-    for face, corners in enumerate(mesh.faces.tolist()):
-        for vertex in corners:
-            around[vertex].append(face)
+def _side_lengths(graph: PieceGraph, lengths: Floats) -> list[list[float]]:
+    found = [[0.0] * len(outline) for outline in graph.outlines]
+    for pair, sides, length in zip(graph.pieces.tolist(), graph.sides.tolist(), lengths.tolist(), strict=True):
+        for piece, side in zip(pair, sides, strict=True):
+            found[piece][side] = length
+    return found
+
+
+def _pieces_at(graph: PieceGraph) -> dict[int, list[int]]:
+    around: dict[int, list[int]] = {}
+    for piece, outline in enumerate(graph.outlines):
+        for vertex in outline:
+            around.setdefault(vertex, []).append(piece)
     return around

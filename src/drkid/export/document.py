@@ -136,6 +136,79 @@ class RigidityDocument(Model):
     second_state_percent: float | None = Field(default=None, description="movement to a second state within the play")
 
 
+class GapsDocument(Model):
+    """Distance of a hinge's two axes at the hinge's ends, over all hinges."""
+
+    mean_mm: float = Field(ge=0)
+    p95_mm: float = Field(ge=0)
+    max_mm: float = Field(ge=0)
+
+
+class DriftDocument(Model):
+    """Of the joined parts' corners from the vertices of assembled.ply, after a rigid fit; percent of its diagonal."""
+
+    mean_mm: float = Field(ge=0)
+    max_mm: float = Field(ge=0)
+    mean_percent: float = Field(ge=0)
+    max_percent: float = Field(ge=0)
+
+
+class BudgetDocument(Model):
+    """What the joint most at risk has and needs, in mm."""
+
+    slip_mm: float = Field(ge=0, description="play of both halves in their pockets")
+    rod_mm: float = Field(ge=0, description="play of both bores around the rod")
+    accuracy_mm: float = Field(gt=0, description="standard deviation of a printed side of this process")
+    joint: tuple[Face, Face] = Field(description="the joint most at risk, by its faces")
+    gap_mm: float = Field(ge=0, description="what the classes' errors open there")
+    scatter_mm: float = Field(ge=0, description="what 95 of 100 prints, each side off by accuracy_mm, stay below")
+    reserve_mm: float = Field(description="what is left; negative: it may not be enough")
+    shared_mm: float = Field(ge=0, description="the most that errors shared by all pieces of a mould open, 95 of 100")
+
+
+class ClosureDocument(Model):
+    """Whether the parts, joined by their hinges alone, make the closed shell."""
+
+    verdict: Literal["closes", "closes with strain", "does not close"]
+    play_mm: float = Field(ge=0, description="gap up to which it closes; with strain up to twice that")
+    gaps: GapsDocument
+    chain: GapsDocument = Field(description="of parts put one to the next at the stated angles, before relaxation")
+    drift: DriftDocument
+    budget: BudgetDocument
+    iterations: int = Field(ge=0)
+    settled: bool = Field(description="whether the relaxation came to rest")
+
+
+class SwingDocument(Model):
+    """How far hinges turn before the pieces touch, in degrees; the least of all joints."""
+
+    wanted_degrees: float
+    inward_degrees: float = Field(description="towards a more convex shell; negative: pieces touch at their places")
+    outward_degrees: float = Field(description="towards a more concave shell")
+    blocked: int = Field(ge=0, description="joints that cannot turn by wanted_degrees both ways")
+
+
+class BuildingDocument(Model):
+    """What the order of building is like."""
+
+    border_mean_mm: float = Field(ge=0, description="open border, over the steps")
+    border_max_mm: float = Field(ge=0)
+    breadth_first_mean_mm: float = Field(ge=0, description="the same in a breadth-first order")
+    enclosed: int = Field(ge=0, description="pieces before the last that go in between neighbours on every side")
+    bridges: int = Field(ge=0, description="pieces that close the shell around a hole")
+    last_goes_in: bool = Field(description="along its outward normal, past neighbours and hinges")
+    last_overlap_percent: float = Field(ge=0, description="the most it meets on its way, of its volume")
+    last_candidates: int = Field(ge=1, description="pieces that were tried as the last")
+
+
+class AssemblyDocument(Model):
+    """Whether and how the kit goes together."""
+
+    closure: ClosureDocument
+    swing: SwingDocument
+    building: BuildingDocument
+
+
 class MetricsDocument(Model):
     """What tables report."""
 
@@ -154,6 +227,7 @@ class MetricsDocument(Model):
     iterations: int
     rigidity: RigidityDocument | None = None
     seconds: dict[str, float]
+    assembly: AssemblyDocument | None = None
 
 
 class ConvergenceDocument(Model):
