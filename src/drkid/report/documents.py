@@ -2,10 +2,18 @@
 
 from collections.abc import Callable
 
+from drkid.export.folder import part_meshes, parts_list
+from drkid.export.layout import REPORT
 from drkid.kit import Kit
 from drkid.progress import Progress, silent
+from drkid.report.report import report_html
+from drkid.report.scene import scene_of
 
-_MAKERS: tuple[tuple[str, Callable[[Kit], dict[str, bytes]]], ...] = ()
+def _report(kit: Kit) -> dict[str, bytes]:
+    return {REPORT: report_html(scene_of(kit), parts_list(kit, part_meshes(kit))).encode()}
+
+
+_MAKERS: tuple[tuple[str, Callable[[Kit], dict[str, bytes]]], ...] = (("report", _report),)
 """What the progress line says, and the function that makes the files, by their names in the kit folder."""
 
 

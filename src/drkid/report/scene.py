@@ -47,6 +47,14 @@ class Scene:
         return {piece.face: i for i, piece in enumerate(self.document.pieces)}
 
     @cached_property
+    def piece_step(self) -> Ints:
+        """(P,): the step at which each piece is put in, from 1."""
+        out = np.zeros(len(self.document.pieces), np.int64)
+        for step in self.document.assembly:
+            out[self.face_piece[step.face]] = step.step
+        return read_only(out)
+
+    @cached_property
     def joint_pieces(self) -> Ints:
         """(J, 2): the two pieces of each joint."""
         pairs = [[self.face_piece[face] for face in joint.faces] for joint in self.document.joints]
