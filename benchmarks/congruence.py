@@ -36,6 +36,7 @@ from drkid.remesh import simplify
 from drkid.spec import UNIVERSAL, KitSpec
 
 HERE = Path(__file__).parent
+PAPER_TABLE = HERE.parent / "src" / "drkid" / "report" / "paper_table.toml"
 SHAPES = (
     "urocell_mito_bean.nii.gz",
     "urocell_mito_elongated.nii.gz",
@@ -225,7 +226,7 @@ def summary(rows: list[dict]) -> None:
 
 def paper() -> None:
     """The paper's own rows, for comparison."""
-    for row in tomllib.loads((HERE / "paper_table.toml").read_text())["row"]:
+    for row in tomllib.loads(PAPER_TABLE.read_text())["row"]:
         near = "{:.2f}/{:.2f}".format(*row["simplified_assembled_percent"])
         size = f"F {row['faces_final']:<5} k {row['classes']:<3} T {row['tolerance_percent']:.2f} %"
         print(f"paper {row['model']:<4} {size}  d_H(Ms,Mf) {near}  {row['seconds']:.0f} s")

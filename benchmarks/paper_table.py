@@ -22,6 +22,7 @@ from drkid.remesh import simplify
 from drkid.spec import KitSpec
 
 HERE = Path(__file__).parent
+PAPER_TABLE = HERE.parent / "src" / "drkid" / "report" / "paper_table.toml"
 HEAD = (
     f"{'model':<22}{'':<7}{'F':>5}{'k':>4}{'T %':>8}{'mean %':>8}  "
     f"{'dH(Mi,Ms)':<11}  {'dH(Ms,Mf)':<11}  {'dH(Mi,Mf)':<11}{'s':>7}{'iter.':>8}"
@@ -85,7 +86,7 @@ def main() -> None:
     parser.add_argument("--iterations", type=int, default=20000, help="most iterations of the solver")
     options = parser.parse_args()
     folder = require_data()
-    rows = tomllib.loads((HERE / "paper_table.toml").read_text())["row"]
+    rows = tomllib.loads(PAPER_TABLE.read_text())["row"]
     chosen = set(options.rows.split(",")) if options.rows else {row["model"] for row in rows}
     small = simplify(read_surface(None, KitSpec()), KitSpec(faces=40)).mesh
     decompose(small, KitSpec(method="pressure", max_iterations=10))  # compiles

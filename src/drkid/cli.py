@@ -30,6 +30,9 @@ app.command(
 )
 
 
+app.command("drkid.commands:render", name="render", help="Draw a kit as a PNG picture, without a GPU.", sort_key=5)
+
+
 def main() -> None:
     """Entry point of the `drkid` program."""
     sys.exit(run(sys.argv[1:]))

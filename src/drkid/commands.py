@@ -6,15 +6,16 @@ import time
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from cyclopts import Group, Parameter
 
-from drkid.errors import SpecError
+from drkid.errors import KitFolderError, SpecError
 from drkid.spec import KitSpec
-from drkid.terminal import StageLines, show_inspection, show_json, show_kit, show_verification
+from drkid.terminal import StageLines, show_inspection, show_json, show_kit, show_picture, show_verification
 
 PALETTE = {"palette", "like", "multisets"}  # lengths and triangles from outside
+MOST_EXPLODED = 10.0  # times the distance to the middle; pieces are specks beyond it
 STALLED = 3  # exit status: the kit is written, but the asked tolerance was not reached
 NOT_AS_STATED = 1  # exit status of `check` for a kit whose files do not bear out its numbers
 TYPED_AS_TEXT = ("spacing", "bed_mm", "palette", "bevel_degrees")  # lists, which a person types as one word
@@ -31,7 +32,7 @@ FROM_PROCESS = {  # what kit.json has because of its process
     "thickness_mm",
 }
 SCALES = {"size_mm", "mean_edge_mm", "fit"}  # one of them at a time
-GROUPS = ("Input", "Mesh", "Congruence", "Pieces")  # in the order in which help shows them
+GROUPS = ("Input", "Mesh", "Congruence", "Pieces", "Output")  # in the order in which help shows them
 
 # ---- flags from KitSpec
 
@@ -182,9 +183,7 @@ def make(
     start = time.perf_counter()
     with StageLines(quiet=as_json) as lines:
         kit = make_kit(source, spec, lines.update)
-        lines.update("export", "", 0.0)
-        written = kit.write(folder, force=force)
-        lines.update("export", "", 1.0)
+        written = kit.write(folder, force=force, progress=lines.update)
     seconds = time.perf_counter() - start
     if as_json:
         show_json({"folder": str(written), "seconds": round(seconds, 3), **kit_summary(kit)})
@@ -240,6 +239,50 @@ def check(kit: Annotated[Path, Parameter(name="KIT", help="A kit folder.")], /, 
     else:
         show_verification(found)
     return 0 if found.passed else NOT_AS_STATED
+
+
+def render(
+    kit: Annotated[Path, Parameter(name="KIT", help="A kit folder.")],
+    /,
+    *,
+    out: Annotated[Path | None, Parameter(name="--out", help="PNG file; named after the kit when not given.")] = None,
+    explode: Annotated[float, Parameter(help="Move pieces apart by this share of their distance to the middle.")] = 0.0,
+    view: Annotated[
+        str,
+        Parameter(
+            help="broad (the longest two axes), front, back, left, right, top, bottom, corner, or AZIMUTH,ELEVATION."
+        ),
+    ] = "broad",
+    size: Annotated[str, Parameter(help="WIDTH or WIDTHxHEIGHT in pixels.")] = "1200",
+    colour: Annotated[
+        Literal["class", "error", "dihedral", "distance"],
+        Parameter(help="Class, or a figure of each piece: its error, its sharpest joint, its distance to the surface."),
+    ] = "class",
+    surface: Annotated[bool, Parameter(negative=(), help="Lay the input's surface over the pieces.")] = False,
+) -> int:
+    """Draw a kit folder as a PNG picture; needs neither a display nor a GPU.
+
+    Examples:
+        drkid render nucleus-kit
+        drkid render nucleus-kit --explode 0.4 --view corner --out apart.png
+        drkid render nucleus-kit --colour distance --surface --size 1600x900
+    """
+    path = out if out is not None else Path(f"{kit.resolve().name}.png")
+    if path.suffix.lower() != ".png":
+        raise SpecError(f"{path} cannot be written", wanted="a .png file", found=path.suffix or "no suffix")
+    if not 0 <= explode <= MOST_EXPLODED:
+        raise SpecError("explode cannot be used", wanted=f"0 to {MOST_EXPLODED:g}", found=f"{explode:g}")
+    from drkid.report import draw_kit  # noqa: PLC0415 — after the arguments are known to be good
+
+    picture, legend = draw_kit(kit, view=view, size=size, explode=explode, by=colour, surface=surface)
+    try:
+        path.write_bytes(picture)
+    except OSError as error:
+        raise KitFolderError(
+            f"{path} cannot be written", wanted="a folder that exists", found=str(error.strerror), remedy="another --out"
+        ) from error
+    show_picture(path, legend)
+    return 0
 
 
 def _stem(source: Path | None) -> str:

@@ -232,6 +232,10 @@ class KitSpec(BaseModel):
         None, "Pieces", "What the process can do where it is a user's own: written to kit.json, read from --process."
     )
 
+    documents: bool = _field(
+        True, "Output", "Write what people hold and look at too: build plates, net, guide, report and fit coupon."
+    )
+
     @model_validator(mode="before")
     @classmethod
     def _implied(cls, values: object) -> object:

@@ -211,6 +211,14 @@ def _taken(found: "Inspection") -> dict[str, str]:
     return rows
 
 
+def show_picture(path: "Path", legend: str) -> None:
+    """Where a picture is, and what its colours mean."""
+    console = _out()
+    console.print(_plain(str(path)), soft_wrap=True)
+    if legend:
+        console.print(_plain(legend), soft_wrap=True)
+
+
 def _show_rows(console: Console, rows: dict[str, str]) -> None:
     """Names and texts in two columns; long texts, such as paths, are never cut."""
     width = max(map(len, rows))

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import trimesh
-from pydantic import ValidationError
 
 from drkid.congruence.softest_mode import rigidity
-from drkid.errors import KitFolderError
 from drkid.export import KitDocument
-from drkid.export.layout import ASSEMBLED, BOM_CSV, BOM_JSON, KIT_JSON, PIECE_CLASS, SIMPLIFIED, SURFACE
+from drkid.export.layout import ASSEMBLED, BOM_CSV, BOM_JSON, PIECE_CLASS, SIMPLIFIED, SURFACE
+from drkid.export.read_back import broken_file, read_document, read_mesh
 from drkid.intersection import self_intersections
 from drkid.kit import Building, Closure, Swing
 from drkid.measure import bend_radians, dihedral
@@ -60,14 +58,14 @@ def verify_kit(folder: str | Path) -> Verification:
         KitFolderError: the folder is no kit, or one of its files is missing or cannot be read.
     """
     folder = Path(folder)
-    kit = _document(folder)
+    kit = read_document(folder)
     surface, simplified, (assembled, face_class) = (
         _surface(folder / SURFACE)[0],
         _surface(folder / SIMPLIFIED)[0],
         _surface(folder / ASSEMBLED),
     )
     if face_class is None:
-        raise _broken(folder / ASSEMBLED, f"a face property {PIECE_CLASS}", "none")
+        raise broken_file(folder / ASSEMBLED, f"a face property {PIECE_CLASS}", "none")
     checks = (
         *_topology({SURFACE: surface, SIMPLIFIED: simplified, ASSEMBLED: assembled}, kit),
         _crossing(assembled),
@@ -89,37 +87,12 @@ def verify_kit(folder: str | Path) -> Verification:
 # ---- reading
 
 
-def _document(folder: Path) -> KitDocument:
-    path = folder / KIT_JSON
-    try:
-        return KitDocument.model_validate_json(path.read_bytes())
-    except OSError as error:
-        raise KitFolderError(
-            f"{folder} is no kit", wanted=f"a folder with a {KIT_JSON}", found=str(error.strerror or error)
-        ) from error
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise _broken(path, "what `drkid schema` prints", f"{where}: {first['msg']}") from error
-
-
 def _surface(path: Path) -> tuple[TriMesh, Ints | None]:
-    mesh = _loaded(path)
+    mesh = read_mesh(path)
     data = mesh.metadata.get("_ply_raw", {}).get("face", {}).get("data", {})
     names = getattr(getattr(data, "dtype", None), "names", None) or ()
     values = np.asarray(data[PIECE_CLASS], np.int64).reshape(-1) if PIECE_CLASS in names else None
     return TriMesh(np.asarray(mesh.vertices), np.asarray(mesh.faces)), values
-
-
-def _loaded(path: Path) -> trimesh.Trimesh:
-    try:
-        return trimesh.load_mesh(path, process=False)
-    except (OSError, ValueError, KeyError, IndexError, TypeError) as error:
-        raise _broken(path, "a mesh", f"{type(error).__name__}: {error}") from error
-
-
-def _broken(path: Path, wanted: str, found: str) -> KitFolderError:
-    return KitFolderError(f"{path} cannot be used", wanted=wanted, found=found, remedy="make the kit again")
 
 
 # ---- checking
@@ -248,7 +221,7 @@ def _parts(folder: Path, kit: KitDocument) -> Check:
     files = sorted({p.file for c in kit.classes for p in c.parts} | {h.file for h in kit.hardware if h.file})
     bad: list[str] = []
     for name in files:
-        mesh = _loaded(folder / name)
+        mesh = read_mesh(folder / name)
         corners, index = np.unique(np.asarray(mesh.triangles).reshape(-1, 3), axis=0, return_inverse=True)
         try:
             solid = Solid.of(TriMesh(corners, index.reshape(-1, 3)))
@@ -354,7 +327,7 @@ def _parts_list(folder: Path, kit: KitDocument) -> Check:
         rows = json.loads((folder / BOM_JSON).read_text())
         lines = (folder / BOM_CSV).read_text().splitlines()
     except (OSError, ValueError) as error:
-        raise _broken(folder / BOM_JSON, "the parts list", str(error)) from error
+        raise broken_file(folder / BOM_JSON, "the parts list", str(error)) from error
     stated = Counter({row["file"] or row["part"]: row["count"] for row in rows})
     wanted = Counter(piece.part for piece in kit.pieces)
     wanted.update({item.file or item.name or "": item.count for item in kit.hardware})

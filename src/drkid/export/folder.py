@@ -6,7 +6,7 @@ import tempfile
 from pathlib import Path
 
 from drkid.errors import KitFolderError
-from drkid.export.bill_of_materials import bom_csv, bom_json
+from drkid.export.bill_of_materials import Row, bom_csv, bom_json
 from drkid.export.kit_document import bom_rows, kit_document, part_name
 from drkid.export.layout import (
     ASSEMBLED,
@@ -21,6 +21,8 @@ from drkid.export.layout import (
 from drkid.export.ply import ply_bytes
 from drkid.export.stl import rounded, stl_bytes
 from drkid.kit import Kit
+from drkid.mesh import TriMesh
+from drkid.progress import StageProgress, nobody
 
 
 def require_writable(folder: Path, force: bool) -> None:
@@ -57,13 +59,15 @@ def _require_replaceable(folder: Path, force: bool) -> None:
         )
 
 
-def write_kit(kit: Kit, folder: Path, force: bool = False) -> Path:
+def write_kit(kit: Kit, folder: Path, force: bool = False, progress: StageProgress = nobody) -> Path:
     """Write the whole kit folder (kit-format, version 1) or nothing; returns its path.
 
     Raises:
         KitFolderError: as `require_writable`, or the disk refuses.
     """
     require_writable(folder, force)
+    documents = _documents(kit, progress)
+    progress("export", "", 0.0)
     folder = folder.absolute()
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
@@ -71,7 +75,7 @@ def write_kit(kit: Kit, folder: Path, force: bool = False) -> Path:
     except OSError as error:
         raise _unwritable(folder, error) from error
     try:
-        for name, content in kit_files(kit).items():
+        for name, content in (kit_files(kit) | documents).items():
             path = staging / name
             path.parent.mkdir(exist_ok=True)
             path.write_bytes(content)
@@ -81,7 +85,17 @@ def write_kit(kit: Kit, folder: Path, force: bool = False) -> Path:
         raise _unwritable(folder, error) from error
     finally:
         shutil.rmtree(staging, ignore_errors=True)
+    progress("export", "", 1.0)
     return folder
+
+
+def _documents(kit: Kit, progress: StageProgress) -> dict[str, bytes]:
+    if not kit.spec.documents:
+        return {}
+    progress("documents", "", 0.0)
+    made = kit.documents(kit, lambda what, fraction: progress("documents", what, fraction))
+    progress("documents", "", 1.0)
+    return made
 
 
 def _swap(staging: Path, folder: Path) -> None:
@@ -100,11 +114,9 @@ def _swap(staging: Path, folder: Path) -> None:
 
 
 def kit_files(kit: Kit) -> dict[str, bytes]:
-    """Every file of the kit folder by its name."""
-    solids = {part_name(part): part.solid for part in kit.part_set.parts}
-    solids |= {connector_file(c.name): c.solid for c in kit.part_set.connectors}
-    meshes = {name: rounded(solid.mesh()) for name, solid in solids.items()}
-    rows = bom_rows(kit, {name: mesh.volume for name, mesh in meshes.items()})
+    """Every file of the kit folder but its documents, by its name."""
+    meshes = part_meshes(kit)
+    rows = parts_list(kit, meshes)
     document = kit_document(kit).model_dump(mode="json", by_alias=True, exclude_none=True)
     document["spec"] = kit.spec.model_dump(mode="json")
     return {
@@ -116,6 +128,18 @@ def kit_files(kit: Kit) -> dict[str, bytes]:
         BOM_JSON: bom_json(rows).encode(),
         KIT_JSON: (json.dumps(document, indent=1) + "\n").encode(),
     }
+
+
+def part_meshes(kit: Kit) -> dict[str, TriMesh]:
+    """The mesh of every part and connector by its file, as written."""
+    solids = {part_name(part): part.solid for part in kit.part_set.parts}
+    solids |= {connector_file(c.name): c.solid for c in kit.part_set.connectors}
+    return {name: rounded(solid.mesh()) for name, solid in solids.items()}
+
+
+def parts_list(kit: Kit, meshes: dict[str, TriMesh]) -> list[Row]:
+    """The rows of the parts list; `meshes` are those of `part_meshes`."""
+    return bom_rows(kit, {name: mesh.volume for name, mesh in meshes.items()})
 
 
 def _unwritable(folder: Path, error: OSError) -> KitFolderError:

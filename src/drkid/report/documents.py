@@ -1,0 +1,39 @@
+"""The documents of a kit: files by name, each made by one function of the kit."""
+
+from collections.abc import Callable
+
+from drkid.export.folder import part_meshes, parts_list
+from drkid.export.layout import GUIDE_HTML, GUIDE_PDF, REPORT
+from drkid.kit import Kit
+from drkid.progress import Progress, silent
+from drkid.report.guide import Guide
+from drkid.report.guide_html import guide_html
+from drkid.report.guide_pages import guide_pages
+from drkid.report.guide_pdf import guide_pdf
+from drkid.report.report import report_html
+from drkid.report.scene import scene_of
+
+def _guide(kit: Kit) -> dict[str, bytes]:
+    guide = Guide(scene_of(kit))
+    pages, closing = guide_pages(guide)
+    return {
+        GUIDE_HTML: guide_html(guide, pages, closing).encode(),
+        GUIDE_PDF: guide_pdf(guide, pages, closing),
+    }
+
+
+def _report(kit: Kit) -> dict[str, bytes]:
+    return {REPORT: report_html(scene_of(kit), parts_list(kit, part_meshes(kit))).encode()}
+
+
+_MAKERS: tuple[tuple[str, Callable[[Kit], dict[str, bytes]]], ...] = (("guide", _guide), ("report", _report))
+"""What the progress line says, and the function that makes the files, by their names in the kit folder."""
+
+
+def make_documents(kit: Kit, progress: Progress = silent) -> dict[str, bytes]:
+    """Every document of the kit by its file's name; the same kit makes the same bytes."""
+    files: dict[str, bytes] = {}
+    for i, (what, make) in enumerate(_MAKERS):
+        progress(what, i / len(_MAKERS))
+        files |= make(kit)
+    return files

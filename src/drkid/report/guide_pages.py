@@ -1,0 +1,85 @@
+"""The sheets of the guide, drawn: what HTML and PDF have in common."""
+
+from dataclasses import dataclass
+
+from drkid.report.building_picture import Builder
+from drkid.report.drawing import Drawing
+from drkid.report.guide import Guide, Instruction, closing_text, joining_text
+
+SHEET_MM = (180.0, 150.0)  # room for the pictures of a group on A4
+PART_MM = 28.0  # width of a part in the table of classes
+
+
+@dataclass(frozen=True)
+class PartLine:
+    """A row of the table of pieces: `sides` are their ticks and lengths, ascending."""
+
+    file: str
+    name: str
+    count: int
+    sides: tuple[tuple[int, float], ...]
+
+
+@dataclass(frozen=True)
+class Page:
+    """A sheet: its steps, their pictures, and what else is on it."""
+
+    steps: tuple[Instruction, ...]
+    drawings: tuple[Drawing, ...]
+    text: str = ""
+    parts: tuple[Drawing, ...] = ()
+
+
+def guide_pages(guide: Guide) -> tuple[list[Page], Page]:
+    """The groups of steps, and the sheet that closes the shell, which carries the drawings of the parts."""
+    builder = Builder(guide)
+    pages = [_page(builder, group) for group in guide.groups]
+    last = guide.instructions[-1:]
+    view = builder.views(last)[0][0]
+    parts = tuple(builder.part_drawing(file, PART_MM) for file in guide.part_names)
+    return pages, Page(last, (builder.drawing(last, view, *SHEET_MM),), closing_text(guide), parts)
+
+
+def _page(builder: Builder, group: tuple[Instruction, ...]) -> Page:
+    """One large picture, or a few smaller ones where no direction shows all new pieces."""
+    views = [view for view, _ in builder.views(group)]
+    width, height = SHEET_MM
+    size = (width, height) if len(views) == 1 else (width / 2 - 3, height) if len(views) == 2 else (width / 2 - 3, 73.0)
+    return Page(group, tuple(builder.drawing(group, view, *size) for view in views))
+
+
+def part_lines(guide: Guide) -> list[PartLine]:
+    """What there is of each part."""
+    return [
+        PartLine(
+            part.file,
+            guide.part_names[part.file],
+            part.count,
+            tuple(zip(ticks, one.edge_lengths, strict=True)),
+        )
+        for one, ticks in zip(guide.scene.document.classes, guide.ticks, strict=True)
+        for part in one.parts
+    ]
+
+
+def front_lines(guide: Guide) -> list[str]:
+    """What to know before beginning."""
+    document = guide.scene.document
+    items = [f"{item.count} × {_hardware(item.name, item.file, item.diameter, item.length)}" for item in document.hardware]
+    also = f" and {', '.join(items)}" if items else ""
+    return [
+        f"{len(document.pieces)} pieces in {len(document.classes)} classes{also}; about "
+        f"{' × '.join(f'{x:.0f}' for x in guide.scene.assembled.extents)} mm when it stands.",
+        "Every piece has the number of its step. Pictures show what stands, grey, and the new pieces in the colour of "
+        "their class, with their number, the letter of their class and ticks that tell their sides apart: one tick on "
+        "the shortest side, two on the next longer, three on the longest; equal sides carry equal ticks.",
+        "A line such as “7 A: | to || of 3” means: piece 7 is of class A; join its side with one tick to the side "
+        "with two ticks of piece 3. L and R in pictures are the left and right hand of pieces whose mirror images "
+        "differ. You look at the outer faces. " + joining_text(guide),
+    ]
+
+
+def _hardware(name: str | None, file: str | None, diameter: float | None, length: float | None) -> str:
+    if diameter is not None and length is not None:
+        return f"{name or 'rod'} of {diameter:g} mm, {length:g} mm long"
+    return f"{(name or '').replace('_', ' ')} ({file})"
