@@ -80,11 +80,15 @@ class Surface:
 
 @dataclass(frozen=True, eq=False)
 class Simplified:
-    """M_s: the surface with the wanted number of vertices; the energy of the Voronoi tessellation per iteration."""
+    """M_s: the surface with the wanted number of vertices; the energy of the Voronoi tessellation per iteration.
+
+    `target` is M_i at the height of M_s's vertices: those lie outside it where it is convex, so that faces straddle it.
+    """
 
     mesh: TriMesh
     energy: tuple[float, ...]
     notes: tuple[str, ...] = ()
+    target: TriMesh | None = None
 
 
 @dataclass(frozen=True)

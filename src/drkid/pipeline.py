@@ -57,7 +57,7 @@ def make_kit(source: str | Path | None = None, spec: KitSpec | None = None, prog
     with stage("remesh") as told:
         spec, simplified = _simplified(surface, spec, told)
     with stage("congruence") as told:
-        decomposition = decompose(simplified.mesh, spec, told, surface.mesh)
+        decomposition = decompose(simplified.mesh, spec, told, simplified.target)
     with stage("parts") as told:
         part_set = make_parts(decomposition, spec, told)
     scale = part_set.scale_mm_per_unit

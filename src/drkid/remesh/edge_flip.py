@@ -43,7 +43,7 @@ def flip_edge(origin: Ints, twin: Ints, start: Ints, h: int) -> None:
 
 
 @njit(cache=True)
-def _is_harmless(origin: Ints, twin: Ints, vertices: Floats, h: int) -> bool:
+def is_harmless(origin: Ints, twin: Ints, vertices: Floats, h: int) -> bool:
     # No fold, no sliver, no sharp ridge that was not there before.
     g = twin[h]
     a, b, c, d = origin[h], origin[g], origin[preceding(h)], origin[preceding(g)]
@@ -79,7 +79,7 @@ def _flip_once(origin: Ints, twin: Ints, start: Ints, vertices: Floats, valence:
         # Σ (v − 6)² changes by 2 (v_c + v_d − v_a − v_b + 2).
         if valence[c] + valence[d] - valence[a] - valence[b] + 2 >= 0 or min(valence[a], valence[b]) <= LEAST_VALENCE:
             continue
-        if are_joined(origin, twin, start, c, d) or not _is_harmless(origin, twin, vertices, h):
+        if are_joined(origin, twin, start, c, d) or not is_harmless(origin, twin, vertices, h):
             continue
         flip_edge(origin, twin, start, h)
         valence[a] -= 1

@@ -11,33 +11,39 @@ from drkid.kit import Simplified, Surface
 from drkid.measure import bend_radians, edge_spread, smallest_angle_degrees
 from drkid.mesh import Floats, TriMesh
 from drkid.progress import Progress, silent
-from drkid.remesh.centroidal_voronoi import lloyd, quasi_newton
+from drkid.remesh.centroidal_voronoi import is_compiled, lloyd, quasi_newton
 from drkid.remesh.closest_point import ClosestPoint
 from drkid.remesh.edge_collapse import collapse_to
 from drkid.remesh.edge_flip import flip_towards_valence_six
 from drkid.remesh.farthest_point import farthest_points
 from drkid.remesh.midpoint_subdivision import subdivided
+from drkid.remesh.offset_surface import offset_surface
+from drkid.remesh.polish import polished
+from drkid.remesh.surface_fit import surface_fit
 from drkid.remesh.tangential_relaxation import relax
+from drkid.remesh.vertex_clustering import clustered
 from drkid.remesh.voronoi_dual import dual, is_twin, refined_dual
 from drkid.spec import KitSpec
 
 MOST_VERTICES = 50_000  # a hundred thousand pieces: nobody assembles more, and memory stays below a few GB
 FINENESS = 10  # vertices of the surface for each one wanted: cells of its vertices then have shapes
-TOUCH_UP = 2  # rounds of flips and relaxation after a tessellation, which is even: more only rounds tips and rims off
-EVENING = 6  # rounds after a collapse, which is not; later ones find no flip to make
+CELL_TRIANGLES, FEWEST_TRIANGLES = 30, 6000  # for each cell and in all, that integrals over cells are taken on
+EVENING = 6  # rounds of flips and relaxation after a collapse, which is uneven; later ones find no flip to make
 RELAXATIONS = 3  # in each of these rounds
 SLIVER_DEGREES = 12.0  # a face with a smaller angle is too narrow for a piece
 FOLD_DEGREES = 130.0  # between the normals of neighbours: a little motion makes a sharper fold cut itself
+FITTING, GLIDING = 1, 2  # which random numbers: those of the seeds are the first
 UNEVEN = 0.2  # standard deviation of the edges over their mean, above which the user should hear of it
 
 
 def simplify(surface: Surface, spec: KitSpec, progress: Progress = silent) -> Simplified:
-    """M_s: a closed manifold mesh of exactly `spec.vertex_count(genus)` vertices, which lie on the surface M_i.
+    """M_s: a closed manifold mesh of exactly `spec.vertex_count(genus)` vertices, as near to the surface M_i as they get.
 
-    A centroidal Voronoi tessellation places the vertices and its dual joins them (Yan et al. 2009); flips and
-    relaxation even edges and valences out (Botsch and Kobbelt 2004). Where cells are no disks, as on parts thinner than
-    an edge, seeds are added until the dual is right, and edges collapsed down to the number again. The mesh has the
-    surface's genus, looks outward and is in one piece; the same seed gives the same mesh.
+    A centroidal Voronoi tessellation places the vertices and its dual joins them (Yan et al. 2009). Where cells are no
+    disks, as on parts thinner than an edge, seeds are added until the dual is right, and edges collapsed down to the
+    number again. Flips and least squares then make edges and valences even and halve the distance (`polish`): vertices
+    lie outside where the surface is convex, so that faces do not cut off what is between. The mesh has the surface's
+    genus, looks outward and is in one piece; the same seed gives the same mesh.
 
     Raises:
         SpecError: there are too few vertices for the genus, or too many for a kit.
@@ -45,19 +51,21 @@ def simplify(surface: Surface, spec: KitSpec, progress: Progress = silent) -> Si
     """
     _check_surface(surface.mesh)
     count = _checked_count(surface.mesh, spec)
-    progress("spreading seeds", 0.0)
+    progress("spreading seeds" if is_compiled() else "compiling (once)", 0.0)
     seeds = farthest_points(surface.mesh, count, np.random.default_rng(spec.seed))
-    seeds, before = lloyd(surface.mesh, seeds, spec.lloyd_iterations)
+    coarse = clustered(surface.mesh, max(FEWEST_TRIANGLES, CELL_TRIANGLES * count))
+    seeds, before = lloyd(coarse, seeds, spec.lloyd_iterations)
     seeds, after = quasi_newton(
-        surface.mesh,
+        coarse,
         seeds,
         spec.newton_iterations,
-        lambda done: progress("evening out cells", 0.1 + 0.7 * done / spec.newton_iterations),
+        lambda done: progress("evening out cells", 0.1 + 0.5 * done / spec.newton_iterations),
     )
-    progress("joining cells", 0.8)
-    found = _best(surface.mesh, seeds, count, spec)
+    progress("joining cells", 0.6)
+    closest = ClosestPoint(surface.mesh)
+    found = _best(closest, seeds, count, spec)
     progress("done", 1.0)
-    return replace(found, energy=tuple(before + after))
+    return replace(found, energy=tuple(before + after), target=offset_surface(closest, found.mesh))
 
 
 def _check_surface(mesh: TriMesh) -> None:
@@ -101,15 +109,17 @@ def _faces(vertices: int, genus: int) -> int:
     return 2 * vertices - 4 + 4 * genus
 
 
-def _best(surface: TriMesh, seeds: Floats, count: int, spec: KitSpec) -> Simplified:
+def _best(closest: ClosestPoint, seeds: Floats, count: int, spec: KitSpec) -> Simplified:
     """The first mesh without flaws: cuts through itself, slivers and folds; or else the one that has least of them."""
-    closest, reached = ClosestPoint(surface), list[int]()
+    surface, reached = closest.surface, list[int]()
+    fit = surface_fit(closest, count, np.random.default_rng([spec.seed, FITTING]))
     best: tuple[tuple[int, float], Simplified] | None = None
     for draft in _drafts(closest, seeds, count, spec):
         if len(draft.mesh.vertices) != count or not is_twin(draft.mesh, surface):
             reached.append(len(draft.mesh.vertices))
             continue
-        for mesh in (_evened(draft.mesh, closest, draft.rounds), draft.mesh):
+        evened = _evened(draft.mesh, closest, draft.rounds)
+        for mesh in (polished(evened, fit, np.random.default_rng([spec.seed, GLIDING])), evened, draft.mesh):
             flaws = _flaws(mesh)
             if best is None or flaws < best[0]:
                 best = flaws, Simplified(mesh, (), draft.notes + _unevenness(mesh))
@@ -141,7 +151,7 @@ def _drafts(closest: ClosestPoint, seeds: Floats, count: int, spec: KitSpec) -> 
     """Meshes of `count` vertices on the surface, or of more where it cannot be done; the most even first."""
     plain = dual(closest, seeds)
     if plain is not None:
-        yield _Draft(plain, 0 if np.isin(plain.valence, (5, 6, 7)).all() else TOUCH_UP)
+        yield _Draft(plain, 0)
     fine = subdivided(closest.surface, FINENESS * count)
     refined = refined_dual(fine, seeds)
     needed = len(refined.vertices)

@@ -51,6 +51,13 @@ def _move_where_harmless(origin: Ints, twin: Ints, start: Ints, vertices: Floats
             vertices[v] = was
 
 
+def moved_where_harmless(mesh: TriMesh, targets: Floats) -> TriMesh:
+    """Vertices at `targets` (V, 3), each unless one of its faces would turn by 90° or become a sliver or a fold."""
+    vertices = mesh.vertices.copy()
+    _move_where_harmless(*half_edges(mesh), vertices, targets)
+    return mesh.moved(vertices)
+
+
 def relax(mesh: TriMesh, closest: ClosestPoint, rounds: int) -> TriMesh:
     """`rounds` times: a step towards even edges along the surface, then to the closest point of the surface.
 

@@ -1,0 +1,36 @@
+"""The surface that the simplified mesh's vertices lie on: M_i, moved along its normals by what the mesh tells.
+
+Vertices on a convex surface put faces inside it. M_s therefore has its vertices a sagitta outside; a solver that is to
+move them about at that height needs the surface of that height, not M_i.
+"""
+
+import numpy as np
+
+from drkid.measure import project
+from drkid.mesh import Floats, TriMesh
+from drkid.remesh.closest_point import ClosestPoint
+from drkid.remesh.surface_fit import barycentric
+
+NORMAL_SMOOTHING = 5  # rounds of averaging of the normals: voxels leave ripples in them
+
+
+def offset_surface(closest: ClosestPoint, mesh: TriMesh) -> TriMesh:
+    """M_i with each vertex moved by the signed height of the mesh's vertices above it, interpolated in their faces."""
+    surface = closest.surface
+    foot, normals = closest(mesh.vertices)
+    apart = mesh.vertices - foot
+    height = np.linalg.norm(apart, axis=1) * np.sign(np.einsum("ij,ij->i", apart, normals))
+    there, face = project(mesh, surface.vertices)
+    weights = barycentric(mesh.corners[face], there)
+    rise = np.einsum("ij,ij->i", weights, height[mesh.faces[face]])
+    return surface.moved(surface.vertices + rise[:, None] * _smooth_normals(surface))
+
+
+def _smooth_normals(mesh: TriMesh) -> Floats:
+    normals, edges = mesh.vertex_normals.copy(), mesh.edges
+    for _ in range(NORMAL_SMOOTHING):
+        total = normals.copy()
+        np.add.at(total, edges[:, 0], normals[edges[:, 1]])
+        np.add.at(total, edges[:, 1], normals[edges[:, 0]])
+        normals = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), np.finfo(float).tiny)
+    return normals

@@ -1,0 +1,203 @@
+"""Vertices where the mesh is nearest to the surface and its edges are most even: one least-squares problem.
+
+Hoppe, DeRose, Duchamp, McDonald and Stuetzle, "Mesh optimization" (SIGGRAPH 1993), sections 3 and 4: squared distances
+of sample points and springs along edges, here of the mean length and not of none. A mesh whose vertices lie on a convex
+surface is inside it; the least squares lift it until it lies on both sides, which keeps the volume too.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from drkid.measure import project, sample
+from drkid.mesh import Floats, Ints, TriMesh
+from drkid.remesh.closest_point import ClosestPoint
+from drkid.remesh.tangential_relaxation import moved_where_harmless
+
+CLOSENESS = 4.0  # of squared distances against squared errors of edges: more costs evenness and narrows angles
+PEAK = 0.25  # how much more a distance of the root mean square weighs than none: more lowers the largest one
+PEAK_EDGE = 0.5  # the same of an edge's error: more widens the narrowest angles
+DAMPING = 0.02  # of a step, in units of the springs; without it, vertices slide where the surface is flat
+REACH = 0.3  # most of a mean edge that a vertex moves in a step: beyond it the closest points are others
+SOLVED, MOST_SOLVER_STEPS = 1e-6, 60  # squared residual, against that of no step, at which the solver stops
+POINTS, FEWEST_POINTS = 10, 3000  # of the surface, for each vertex and in all
+RULE = np.array([[2 / 3, 1 / 6, 1 / 6], [1 / 6, 2 / 3, 1 / 6], [1 / 6, 1 / 6, 2 / 3]])  # of degree 2 in a triangle
+
+
+@njit(cache=True)
+def _accumulate(count: int, points: "Points", share: Floats) -> tuple[Floats, Floats]:
+    # For each face the normal matrix (9, 9) and the gradient (9,) of its points: r = away + direction · Σ weight u.
+    matrix, gradient, row = np.zeros((count, 9, 9)), np.zeros((count, 9)), np.empty(9)
+    for i in range(len(points.face)):
+        f = points.face[i]
+        for k in range(9):
+            row[k] = points.weights[i, k // 3] * points.direction[i, k % 3]
+        for k in range(9):
+            gradient[f, k] += share[i] * points.away[i] * row[k]
+            for m in range(9):
+                matrix[f, k, m] += share[i] * row[k] * row[m]
+    return matrix, gradient
+
+
+class System(NamedTuple):
+    """Normal equations of one step, kept by face and by edge.
+
+    `matrix` (F, 9, 9) of each face's points, `along` (E, 3) the edges' directions, `stiffness` (E,) of the springs.
+    """
+
+    faces: Ints
+    matrix: Floats
+    edges: Ints
+    along: Floats
+    stiffness: Floats
+    damping: float
+
+
+@njit(cache=True)
+def _product(system: System, x: Floats, y: Floats) -> None:
+    # y = A x
+    faces, matrix, edges, along, stiffness, damping = system
+    y[:] = damping * x
+    for f in range(len(faces)):
+        for row in range(9):
+            total = 0.0
+            for column in range(9):
+                total += matrix[f, row, column] * x[faces[f, column // 3], column % 3]
+            y[faces[f, row // 3], row % 3] += total
+    for e in range(len(edges)):
+        a, b, change = edges[e, 0], edges[e, 1], 0.0
+        for d in range(3):
+            change += along[e, d] * (x[b, d] - x[a, d])
+        for d in range(3):
+            y[a, d] -= stiffness[e] * change * along[e, d]
+            y[b, d] += stiffness[e] * change * along[e, d]
+
+
+@njit(cache=True)
+def _diagonal(system: System, count: int) -> Floats:
+    faces, matrix, edges, along, stiffness, damping = system
+    found = np.full((count, 3), damping)
+    for f in range(len(faces)):
+        for row in range(9):
+            found[faces[f, row // 3], row % 3] += matrix[f, row, row]
+    for e in range(len(edges)):
+        for d in range(3):
+            found[edges[e, 0], d] += stiffness[e] * along[e, d] ** 2
+            found[edges[e, 1], d] += stiffness[e] * along[e, d] ** 2
+    return found
+
+
+@njit(cache=True)
+def _conjugate_gradients(system: System, right: Floats) -> Floats:
+    # Preconditioned by the diagonal (Shewchuk 1994, section 12); an inexact solution makes an inexact step, no error.
+    diagonal = _diagonal(system, len(right))
+    x, r, q = np.zeros_like(right), right.copy(), np.empty_like(right)
+    z = r / diagonal
+    p, rz = z.copy(), (r * z).sum()
+    least = SOLVED * rz
+    for _ in range(MOST_SOLVER_STEPS):
+        if rz <= least:
+            break
+        _product(system, p, q)
+        alpha = rz / (p * q).sum()
+        x += alpha * p
+        r -= alpha * q
+        z = r / diagonal
+        before, rz = rz, (r * z).sum()
+        p = z + rz / before * p
+    return x
+
+
+class Points(NamedTuple):
+    """Pairs of points to bring together, one of them on a face of the mesh.
+
+    `face` (P,), `weights` (P, 3) barycentric, `away` (P,) the signed distance, `direction` (P, 3) of unit length in
+    which it grows, `share` (P,) of the area that the pair stands for.
+    """
+
+    face: Ints
+    weights: Floats
+    away: Floats
+    direction: Floats
+    share: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceFit:
+    """A surface with what is needed to fit meshes to it: `points` (P, 3) spread over it, and its tree."""
+
+    closest: ClosestPoint
+    points: Floats
+
+    def stepped(self, mesh: TriMesh) -> TriMesh:
+        """One step of Gauss and Newton towards closeness and even edges; the mesh is closed and manifold.
+
+        Minimised are the mean squared distance of the two surfaces, from both sides, times `CLOSENESS`, and the mean
+        squared error of the edges, all in units of the mean edge. A vertex stays where it is if one of its faces would
+        turn by 90° or become a sliver or a fold.
+        """
+        parts = self._from_mesh(mesh), self._from_surface(mesh)
+        pairs = Points(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+        squares = pairs.away**2
+        raised = 1 + PEAK * squares / max(float((pairs.share * squares).sum()) / 2, np.finfo(float).tiny)
+        share = CLOSENESS / 2 * pairs.share * raised
+        matrix, gradient = _accumulate(len(mesh.faces), pairs, share)
+        right = np.zeros_like(mesh.vertices)
+        np.add.at(right, mesh.faces.ravel(), -gradient.reshape(-1, 3))
+        ends, lengths = mesh.vertices[mesh.edges], mesh.edge_lengths
+        along = (ends[:, 1] - ends[:, 0]) / lengths[:, None]
+        surplus = lengths - mesh.mean_edge
+        stiffness = (1 + PEAK_EDGE * surplus**2 / max(float((surplus**2).mean()), np.finfo(float).tiny)) / len(lengths)
+        pull = (stiffness * surplus)[:, None] * along
+        np.add.at(right, mesh.edges[:, 0], pull)
+        np.add.at(right, mesh.edges[:, 1], -pull)
+        system = System(mesh.faces, matrix, mesh.edges, along, stiffness, DAMPING / len(mesh.vertices))
+        step = _conjugate_gradients(system, right)
+        size = np.linalg.norm(step, axis=1, keepdims=True)
+        step *= np.minimum(1, REACH * mesh.mean_edge / np.maximum(size, np.finfo(float).tiny))
+        return moved_where_harmless(mesh, mesh.vertices + step)
+
+    def _from_mesh(self, mesh: TriMesh) -> Points:
+        here = np.einsum("rc,fcd->frd", RULE, mesh.corners).reshape(-1, 3)
+        there, normals = self.closest(here)
+        count = len(mesh.faces)
+        share = (mesh.areas[:, None] / (len(RULE) * mesh.areas.sum()) * np.ones(len(RULE))).ravel()
+        away, direction = _signed(here, there, normals, self._rounding)
+        return Points(np.repeat(np.arange(count), len(RULE)), np.tile(RULE, (count, 1)), away, direction, share)
+
+    def _from_surface(self, mesh: TriMesh) -> Points:
+        there, face = project(mesh, self.points)
+        away, direction = _signed(there, self.points, mesh.face_normals[face], self._rounding)
+        share = np.full(len(self.points), 1 / len(self.points))
+        return Points(face, barycentric(mesh.corners[face], there), away, direction, share)
+
+    @property
+    def _rounding(self) -> float:
+        return 1e-9 * self.closest.surface.diagonal
+
+
+def surface_fit(closest: ClosestPoint, count: int, rng: np.random.Generator) -> SurfaceFit:
+    """For meshes of `count` vertices."""
+    return SurfaceFit(closest, sample(closest.surface, max(FEWEST_POINTS, POINTS * count), rng))
+
+
+def _signed(here: Floats, there: Floats, normals: Floats, rounding: float) -> tuple[Floats, Floats]:
+    """Distances (P,) of points from those on the surface, positive outside, and the directions in which they grow."""
+    apart = here - there
+    size = np.linalg.norm(apart, axis=1)
+    sign = np.where(np.einsum("ij,ij->i", apart, normals) < 0, -1.0, 1.0)
+    direction = apart * (sign / np.maximum(size, rounding))[:, None]
+    return size * sign, np.where((size > rounding)[:, None], direction, normals)
+
+
+def barycentric(corners: Floats, points: Floats) -> Floats:
+    """(P, 3): barycentric coordinates of points in triangles (Ericson, Real-Time Collision Detection, 3.4)."""
+    a, b, c = np.moveaxis(corners, 1, 0)
+    u, v, w = b - a, c - a, points - a
+    uu, uv, vv = (np.einsum("ij,ij->i", p, q) for p, q in ((u, u), (u, v), (v, v)))
+    wu, wv = (np.einsum("ij,ij->i", w, q) for q in (u, v))
+    area = np.maximum(uu * vv - uv * uv, np.finfo(float).tiny)
+    s, t = (vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area
+    return np.clip(np.column_stack([1 - s - t, s, t]), 0, 1)
