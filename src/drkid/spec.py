@@ -153,6 +153,13 @@ class KitSpec(BaseModel):
     spacing: Triple | None = _field(None, "Input", "Voxel size X,Y,Z, instead of the file's.")
     unit: Unit | None = _field(None, "Input", "Unit of voxel size or mesh coordinates, instead of the file's.")
     smooth: bool = _field(True, "Input", "Remove the staircase of voxels; nothing moves by more than one voxel.")
+    max_genus: int | None = _field(
+        None,
+        "Input",
+        "Most handles that the surface may have: the smallest ones beyond are closed, filled or cut, and told; all are "
+        "kept when not given.",
+        ge=0,
+    )
 
     faces: int | None = _field(
         None, "Mesh", f"Number of pieces: faces of the simplified mesh ({DEFAULT_FACES} when neither is given).", ge=4
