@@ -7,7 +7,6 @@ from typing import Any
 
 import igl
 import numpy as np
-import scipy.ndimage as ndi
 
 from drkid.errors import SpecError
 from drkid.formats import is_mesh_path, sha256_of, suffix_of
@@ -23,6 +22,7 @@ from drkid.voxels import (
     Voxels,
     components,
     foreground,
+    label_box,
     label_counts,
     otsu_threshold,
     voxel_object,
@@ -253,12 +253,9 @@ def _volume_facts(volume: LabelVolume) -> VolumeFacts:
 
 
 def _label_facts(values: Voxels) -> tuple[LabelFacts, ...]:
-    counts = label_counts(values)
-    known = np.array(list(counts))
-    rank = np.where(values > 0, np.searchsorted(known, values) + 1, 0).astype(np.int32)
-    boxes = ndi.find_objects(rank)
     facts: list[LabelFacts] = []
-    for (label, voxels), (x, y, z) in zip(counts.items(), boxes, strict=True):
+    for label, voxels in label_counts(values).items():
+        x, y, z = label_box(values, label)
         ends = zip((x, y, z), values.shape, strict=True)
         border = any(side.start == 0 or side.stop == size for side, size in ends)
         first, last = (x.start, y.start, z.start), (x.stop - 1, y.stop - 1, z.stop - 1)

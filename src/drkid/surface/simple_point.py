@@ -98,7 +98,7 @@ def deform(inside: NDArray[np.uint8], target: NDArray[np.uint8], order: NDArray[
     for x, y, z in np.ndindex((nx, ny, nz)):
         if _wanted(inside, target, x, y, z):
             queued[x, y, z] = 1
-            heappush(heap, (order[x, y, z], (x * ny + y) * nz + z))
+            heappush(heap, (np.float32(order[x, y, z]), (x * ny + y) * nz + z))
     while heap:
         _, at = heappop(heap)
         x, y, z = at // (ny * nz), (at // nz) % ny, at % nz
@@ -110,7 +110,7 @@ def deform(inside: NDArray[np.uint8], target: NDArray[np.uint8], order: NDArray[
             i, j, k = x + a - 1, y + b - 1, z + c - 1
             if not queued[i, j, k] and _wanted(inside, target, i, j, k):
                 queued[i, j, k] = 1
-                heappush(heap, (order[i, j, k], (i * ny + j) * nz + k))
+                heappush(heap, (np.float32(order[i, j, k]), (i * ny + j) * nz + k))
 
 
 @njit(cache=True)
