@@ -297,6 +297,12 @@ class KitSpec(BaseModel):
             return PRESSURE_TOLERANCE
         return EXACT_TOLERANCE if faces <= MOST_WALKED_FACES else LARGE_TOLERANCE
 
+    def face_count(self, genus: int) -> int:
+        """Faces of the simplified mesh of a genus: as asked, or from the vertices by Euler's formula."""
+        if self.vertices is not None:
+            return 2 * self.vertices - 4 + 4 * genus
+        return self.faces if self.faces is not None else DEFAULT_FACES
+
     def vertex_count(self, genus: int) -> int:
         """Vertices of the simplified mesh: as asked, or from the faces by Euler's formula F = 2V − 4 + 4g.
 
