@@ -29,6 +29,16 @@ def test_slabs_cover_every_voxel_once(order, monkeypatch):
     np.testing.assert_array_equal(np.sort(np.concatenate([part.ravel() for part in parts])), np.arange(210))
 
 
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 0, 1), (1, 2, 0)])
+@pytest.mark.parametrize("names", [[0, 1, 2, 3], [0, 7, 4_000_000, 5_000_000]])
+def test_boxes_of_labels_are_tight_in_every_layout(order, names):
+    index = (np.random.default_rng(0).random((9, 8, 7)) < 0.02) * np.random.default_rng(1).integers(1, 4, (9, 8, 7))
+    values = np.array(names, np.int64)[index].transpose(order)
+    labels = np.unique(values[values > 0]).tolist()
+    for label, box in zip(labels, voxels.label_boxes(values, labels), strict=True):
+        assert box == voxels.bounding_box(values == label) == voxels.label_box(values, label)
+
+
 @given(st.integers(0, 10_000))
 def test_the_box_is_tight(seed):
     mask = np.random.default_rng(seed).random((6, 7, 8)) < 0.01

@@ -194,11 +194,23 @@ def make(
 
 @_with_spec_flags
 def inspect_source(
-    source: Annotated[Input, Parameter(name="INPUT")] = None, /, *, as_json: Json = False, **flags: Any
+    source: Annotated[Input, Parameter(name="INPUT")] = None,
+    /,
+    *,
+    for_distance_percent: Annotated[
+        float | None,
+        Parameter(
+            help="Mean distance of the simplified mesh from the surface, in percent of the box's diagonal: recommend "
+            "the number of faces that it needs."
+        ),
+    ] = None,
+    as_json: Json = False,
+    **flags: Any,
 ) -> int:
     """Tell what a file holds and what `make` would take of it, without making anything.
 
     Examples:
+        drkid inspect mitochondrion.nii.gz --for-distance-percent 0.5
         drkid inspect labels.tif
         drkid inspect labels.tif --label 12 --json
     """
@@ -206,7 +218,10 @@ def inspect_source(
     from drkid import inspection  # noqa: PLC0415
     from drkid.data import nucleus_path  # noqa: PLC0415
 
-    found = inspection.inspect_source(nucleus_path() if source is None else source, spec)
+    if for_distance_percent is not None and not for_distance_percent > 0:
+        raise SpecError("for-distance-percent cannot be used", wanted="above 0", found=f"{for_distance_percent:g}")
+    path = nucleus_path() if source is None else source
+    found = inspection.inspect_source(path, spec, for_distance_percent)
     if as_json:
         show_json(found.to_dict())
     else:

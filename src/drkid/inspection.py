@@ -5,11 +5,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import igl
 import numpy as np
-import scipy.ndimage as ndi
 
-from drkid.errors import SpecError
+from drkid.errors import InputError, SpecError
+from drkid.expected_distance import ExpectedDistance, expected_distances, faces_for_distance
 from drkid.formats import is_mesh_path, sha256_of, suffix_of
 from drkid.kit import LabelVolume, Surface, VolumeKind
 from drkid.mesh import Floats, TriMesh
@@ -23,15 +22,15 @@ from drkid.voxels import (
     Voxels,
     components,
     foreground,
+    label_boxes,
     label_counts,
     otsu_threshold,
     voxel_object,
 )
+from drkid.wall_thickness import even_edge, require_walls, wall_thickness
 
 COMPONENTS_LISTED = 10
 THIN_SHARE = 0.01  # of the area that has a wall opposite
-FACING_COSINE = -0.5  # of the angle between a wall's two sides: 120 degrees at least
-LIFT_DIAGONALS = 1e-6  # rays start this much below the surface, so that they do not hit their own face
 
 Triple = tuple[float, float, float]
 Index = tuple[int, int, int]
@@ -119,7 +118,10 @@ class Taken:
 
 @dataclass(frozen=True)
 class Inspection:
-    """Either `volume` or `mesh` is given; `warnings` are what may spoil a kit, `notes` what was assumed."""
+    """Either `volume` or `mesh` is given; `warnings` are what may spoil a kit, `notes` what was assumed.
+
+    `distances` are those expected of M_s at several numbers of faces; `recommended` is what a wanted one needs.
+    """
 
     name: str
     format: str
@@ -133,21 +135,28 @@ class Inspection:
     thickness: Thickness | None
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
+    distances: tuple[ExpectedDistance, ...] = ()
+    recommended: ExpectedDistance | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Plain dictionaries, lists and numbers, as for JSON."""
         return asdict(self)
 
 
-def inspect_source(path: Path, spec: KitSpec) -> Inspection:
+def inspect_source(path: Path, spec: KitSpec, for_distance_percent: float | None = None) -> Inspection:
     """What the file holds, what `make` would take from it with this spec, and what may spoil the kit.
+
+    Args:
+        path: a volume or a mesh file.
+        spec: the parameters that `make` would get.
+        for_distance_percent: mean distance from M_i to M_s, in percent of the box's diagonal, to find the faces for.
 
     Raises:
         SpecError: a parameter that the source has no use for.
         InputError: whatever `make` would refuse the file for.
     """
     if is_mesh_path(path):
-        return _inspect_mesh(path, spec)
+        return _inspect_mesh(path, spec, for_distance_percent)
     volume = read_volume(path, spec)
     surface = extract_surface(volume, spec)
     inside = foreground(volume, spec)
@@ -167,10 +176,16 @@ def inspect_source(path: Path, spec: KitSpec) -> Inspection:
         thickness=thickness,
         notes=surface.notes,
         warnings=(*warnings, *_thin_warning(thickness, taken, volume.unit), *_border_warning(surface)),
+        distances=expected_distances(surface, spec),
+        recommended=_recommended(surface, spec, for_distance_percent),
     )
 
 
-def _inspect_mesh(path: Path, spec: KitSpec) -> Inspection:
+def _recommended(surface: Surface, spec: KitSpec, percent: float | None) -> ExpectedDistance | None:
+    return None if percent is None else faces_for_distance(surface, spec, percent)
+
+
+def _inspect_mesh(path: Path, spec: KitSpec, for_distance_percent: float | None) -> Inspection:
     surface = extract_surface(path, spec)
     mesh = surface.mesh
     taken, warnings = _taken(surface, spec)
@@ -190,6 +205,8 @@ def _inspect_mesh(path: Path, spec: KitSpec) -> Inspection:
         thickness=thickness,
         notes=surface.notes,
         warnings=(*warnings, *_thin_warning(thickness, taken, spec.unit)),
+        distances=expected_distances(surface, spec),
+        recommended=_recommended(surface, spec, for_distance_percent),
     )
 
 
@@ -198,15 +215,20 @@ def _inspect_mesh(path: Path, spec: KitSpec) -> Inspection:
 
 def _taken(surface: Surface, spec: KitSpec) -> tuple[Taken, tuple[str, ...]]:
     mesh, source = surface.mesh, surface.source
-    area, warnings = float(mesh.areas.sum()), ()
+    area = float(mesh.areas.sum())
+    warnings: tuple[str, ...] = ()
     faces = vertices = mean_edge = None
     try:
         vertices = spec.vertex_count(mesh.genus)
     except SpecError as error:
         warnings = (str(error),)
+    try:
+        warnings += require_walls(mesh, spec.face_count(mesh.genus))
+    except InputError as error:
+        warnings += (str(error),)
     if vertices is not None:
         faces = 2 * vertices - 4 + 4 * mesh.genus
-        mean_edge = math.sqrt(4 * area / (math.sqrt(3) * faces))
+        mean_edge = even_edge(area, faces)
     taken = Taken(
         source.label,
         source.threshold,
@@ -253,12 +275,9 @@ def _volume_facts(volume: LabelVolume) -> VolumeFacts:
 
 
 def _label_facts(values: Voxels) -> tuple[LabelFacts, ...]:
-    counts = label_counts(values)
-    known = np.array(list(counts))
-    rank = np.where(values > 0, np.searchsorted(known, values) + 1, 0).astype(np.int32)
-    boxes = ndi.find_objects(rank)
     facts: list[LabelFacts] = []
-    for (label, voxels), (x, y, z) in zip(counts.items(), boxes, strict=True):
+    counts = label_counts(values)
+    for (label, voxels), (x, y, z) in zip(counts.items(), label_boxes(values, list(counts)), strict=True):
         ends = zip((x, y, z), values.shape, strict=True)
         border = any(side.start == 0 or side.stop == size for side, size in ends)
         first, last = (x.start, y.start, z.start), (x.stop - 1, y.stop - 1, z.stop - 1)
@@ -270,24 +289,14 @@ def _label_facts(values: Voxels) -> tuple[LabelFacts, ...]:
 
 
 def _thickness(mesh: TriMesh, voxel: float | None) -> Thickness | None:
-    """From the middle of every face straight inwards to a wall that faces it; None where no wall does.
-
-    The shape diameter (Shapira et al., "Consistent mesh partitioning", Visual Computer 24, 2008) with one ray to a
-    face. Distances to the background on the voxel grid were tried: its staircase makes every shape look thin.
-    """
-    tree: Any = igl.AABB()
-    tree.init(np.array(mesh.vertices), np.array(mesh.faces))
-    lift = LIFT_DIAGONALS * mesh.diagonal
-    start = mesh.corners.mean(axis=1) - lift * mesh.face_normals
-    hit, beyond, _ = tree.intersect_ray_first(mesh.vertices, mesh.faces, start, -mesh.face_normals)
-    distance = np.asarray(beyond) + lift
-    facing = np.einsum("ij,ij->i", mesh.face_normals, mesh.face_normals[hit]) < FACING_COSINE
-    walls = np.flatnonzero((hit >= 0) & facing)
+    """Of the area that has a wall opposite; None where no wall has."""
+    found = wall_thickness(mesh)
+    walls = np.flatnonzero(np.isfinite(found))
     if not walls.size:
         return None
-    walls = walls[np.argsort(distance[walls])]
+    walls = walls[np.argsort(found[walls])]
     share = np.cumsum(mesh.areas[walls])
-    thin, typical = (float(distance[walls[np.searchsorted(share, part * share[-1])]]) for part in (THIN_SHARE, 0.5))
+    thin, typical = (float(found[walls[np.searchsorted(share, part * share[-1])]]) for part in (THIN_SHARE, 0.5))
     return Thickness(thin, typical, thin / voxel if voxel else None, typical / voxel if voxel else None)
 
 

@@ -22,6 +22,7 @@ from drkid.report import make_documents
 from drkid.spec import DEFAULT_FACES, KitSpec
 from drkid.surface import extract_surface
 from drkid.volume import read_volume
+from drkid.wall_thickness import require_walls
 
 STAGES = ("surface", "remesh", "congruence", "parts", "assembly", "measure")
 
@@ -103,18 +104,25 @@ def read_surface(source: str | Path | None, spec: KitSpec, progress: Progress = 
 def _simplified(surface: Surface, spec: KitSpec, progress: Progress) -> tuple[KitSpec, Simplified]:
     """M_s, and the spec with the number of faces where it follows from given lengths and a size."""
     if spec.palette is None or spec.size_mm is None:
-        return spec, simplify(surface, spec, progress)
+        return spec, _remeshed(surface, spec, progress)
     if spec.faces is not None or spec.vertices is not None:
-        simplified = simplify(surface, spec, progress)
+        simplified = _remeshed(surface, spec, progress)
         require_agreement(simplified.mesh, spec)
         return spec, simplified
     spec = spec.model_copy(update={"faces": faces_at_size(surface.mesh, spec)})
-    simplified = simplify(surface, spec, progress)
+    simplified = _remeshed(surface, spec, progress)
     better = corrected_faces(simplified.mesh, spec)
     if better == spec.faces:
         return spec, simplified
     spec = spec.model_copy(update={"faces": better})
-    return spec, simplify(surface, spec, progress)
+    return spec, _remeshed(surface, spec, progress)
+
+
+def _remeshed(surface: Surface, spec: KitSpec, progress: Progress) -> Simplified:
+    """M_s, once the walls are known to be thick enough for pieces of its size."""
+    thin = require_walls(surface.mesh, spec.face_count(surface.mesh.genus))
+    simplified = simplify(surface, spec, progress)
+    return replace(simplified, notes=(*thin, *simplified.notes))
 
 
 def _scaled(decomposition: Decomposition, scale: float) -> Decomposition:

@@ -123,6 +123,13 @@ class KitSpec(BaseModel):
     spacing: Triple | None = _field(None, "Input", "Voxel size X,Y,Z, instead of the file's.")
     unit: Unit | None = _field(None, "Input", "Unit of voxel size or mesh coordinates, instead of the file's.")
     smooth: bool = _field(True, "Input", "Remove the staircase of voxels; nothing moves by more than one voxel.")
+    max_genus: int | None = _field(
+        None,
+        "Input",
+        "Most handles that the surface may have: the smallest ones beyond are closed, filled or cut, and told; all are "
+        "kept when not given.",
+        ge=0,
+    )
 
     faces: int | None = _field(
         None, "Mesh", f"Number of pieces: faces of the simplified mesh ({DEFAULT_FACES} when neither is given).", ge=4
@@ -288,6 +295,12 @@ class KitSpec(BaseModel):
         if self.method == "pressure":
             return PRESSURE_TOLERANCE
         return EXACT_TOLERANCE if faces <= MOST_WALKED_FACES else LARGE_TOLERANCE
+
+    def face_count(self, genus: int) -> int:
+        """Faces of the simplified mesh of a genus: as asked, or from the vertices by Euler's formula."""
+        if self.vertices is not None:
+            return 2 * self.vertices - 4 + 4 * genus
+        return self.faces if self.faces is not None else DEFAULT_FACES
 
     def vertex_count(self, genus: int) -> int:
         """Vertices of the simplified mesh: as asked, or from the faces by Euler's formula F = 2V − 4 + 4g.

@@ -173,10 +173,26 @@ def show_inspection(found: "Inspection") -> None:
         _more(console, found.component_count)
     console.print("[bold]make would take[/]")
     _show_rows(console, _taken(found))
+    _show_distances(console, found)
     for note in found.notes:
         console.print(f"[yellow]note:[/] {_plain(note)}", soft_wrap=True)
     for warning in found.warnings:
         console.print(f"[bold red]warning:[/] {_plain(warning)}", soft_wrap=True)
+
+
+def _show_distances(console: Console, found: "Inspection") -> None:
+    if found.distances:
+        table = Table("faces", "mean %", "max %", title_justify="left", box=None)
+        table.title = "expected distance from the surface, of its box"
+        for one in found.distances:
+            table.add_row(str(one.faces), f"{one.mean_percent:.2g}", f"{one.max_percent:.2g}")
+        console.print(table)
+    if found.recommended is not None:
+        best = found.recommended
+        console.print(
+            f"[bold]recommended[/]  --faces {best.faces}: {best.mean_percent:.2g} % mean, {best.max_percent:.2g} % max",
+            soft_wrap=True,
+        )
 
 
 def _contents(found: "Inspection") -> dict[str, str]:

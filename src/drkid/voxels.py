@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import scipy.ndimage as ndi
+from numba import njit
 from numpy.typing import NDArray
 from skimage.filters import threshold_otsu
 
@@ -42,16 +43,92 @@ def label_counts(values: Voxels) -> dict[int, int]:
     """Voxels of each positive label, in ascending order of the labels."""
     counts: dict[int, int] = {}
     for slab in slabs(values):
-        flat = slab.ravel(order="K")
-        flat = flat[flat > 0]
-        if flat.size and flat.max() <= LARGEST_TABLE:
-            table = np.bincount(flat.astype(np.int32))
-            found, voxels = np.flatnonzero(table), table[table > 0]
+        table = np.zeros(LARGEST_TABLE + 1, np.int64)
+        if _tabulated(_in_memory_order(slab), table):
+            found = np.flatnonzero(table)
+            voxels = table[found]
         else:
-            found, voxels = np.unique(flat, return_counts=True)
+            found, voxels = np.unique(slab[slab > 0], return_counts=True)
         for label, count in zip(found.tolist(), voxels.tolist(), strict=True):
             counts[int(label)] = counts.get(int(label), 0) + count
     return dict(sorted(counts.items()))
+
+
+def _in_memory_order(values: Voxels) -> Voxels:
+    """The same voxels, the axis of the longest stride first: how a loop should walk through them."""
+    plain = np.asarray(values).view(np.uint8) if values.dtype.kind == "b" else np.asarray(values)
+    return plain.transpose(np.argsort([-abs(stride) for stride in plain.strides], kind="stable"))
+
+
+@njit(cache=True)
+def _tabulated(values: Voxels, table: NDArray[np.int64]) -> bool:
+    """Add to the table the voxels of each positive label; False as soon as a label is beyond it."""
+    for i in range(values.shape[0]):
+        for j in range(values.shape[1]):
+            for k in range(values.shape[2]):
+                label = int(values[i, j, k])
+                if label > 0:
+                    if label >= table.size:
+                        return False
+                    table[label] += 1
+    return True
+
+
+def label_box(values: Voxels, label: int) -> Box:
+    """The smallest box that holds every voxel of a label that is there; one pass, no mask of the whole volume."""
+    order = np.argsort([-abs(stride) for stride in values.strides], kind="stable")
+    ends = np.empty((3, 2), np.int64)
+    _bounded(_in_memory_order(values), label, ends)
+    sides = [slice(0)] * 3
+    for axis, (low, high) in zip(order.tolist(), ends.tolist(), strict=True):
+        sides[axis] = slice(low, high + 1)
+    return sides[0], sides[1], sides[2]
+
+
+def label_boxes(values: Voxels, labels: list[int]) -> list[Box]:
+    """The box of each of the labels, ascending, in one pass where none is beyond the table."""
+    if not labels or labels[-1] > LARGEST_TABLE:
+        return [label_box(values, label) for label in labels]
+    order = np.argsort([-abs(stride) for stride in values.strides], kind="stable")
+    rank = np.full(labels[-1] + 1, -1, np.int32)
+    rank[labels] = np.arange(len(labels))
+    ends = np.empty((len(labels), 3, 2), np.int64)
+    _all_bounded(_in_memory_order(values), rank, ends)
+    back = np.argsort(order)
+    boxes = [[slice(int(low), int(high) + 1) for low, high in one[back]] for one in ends]
+    return [(x, y, z) for x, y, z in boxes]
+
+
+@njit(cache=True)
+def _all_bounded(values: Voxels, rank: NDArray[np.int32], ends: NDArray[np.int64]) -> None:
+    """Write the first and last index of each ranked label along each axis."""
+    ends[:, :, 0] = values.size
+    ends[:, :, 1] = -1
+    for at in np.ndindex(values.shape):
+        label = int(values[at])
+        if 0 < label < rank.size and rank[label] >= 0:
+            one = ends[rank[label]]
+            for axis in range(3):
+                one[axis, 0] = min(one[axis, 0], at[axis])
+                one[axis, 1] = max(one[axis, 1], at[axis])
+
+
+@njit(cache=True)
+def _bounded(values: Voxels, label: int, ends: NDArray[np.int64]) -> None:
+    """Write the first and last index of the label along each axis."""
+    ends[:, 0] = values.size
+    ends[:, 1] = -1
+    for i in range(values.shape[0]):
+        for j in range(values.shape[1]):
+            first, last = -1, -1
+            for k in range(values.shape[2]):
+                if values[i, j, k] == label:
+                    first = k if first < 0 else first
+                    last = k
+            if first >= 0:
+                ends[0, 0], ends[0, 1] = min(ends[0, 0], i), max(ends[0, 1], i)
+                ends[1, 0], ends[1, 1] = min(ends[1, 0], j), max(ends[1, 1], j)
+                ends[2, 0], ends[2, 1] = min(ends[2, 0], first), max(ends[2, 1], last)
 
 
 def otsu_threshold(values: Voxels) -> float:
@@ -134,7 +211,8 @@ def _of_label(volume: LabelVolume, spec: KitSpec) -> Foreground:
     notes: tuple[str, ...] = ()
     if len(counts) > 1 and spec.label is None:
         notes = (f"label {label} taken, the largest of {len(counts)} ({counts[label]} voxels)",)
-    return _cropped(volume, volume.values == label, label=label, notes=notes)
+    box = label_box(volume.values, label)
+    return Foreground(np.asarray(volume.values[box] == label), box, volume.values.shape, label=label, notes=notes)
 
 
 def _abbreviated(counts: dict[int, int], most: int = 12) -> str:
@@ -166,12 +244,11 @@ def _cropped(
     mask: Bools,
     *,
     soft: bool = False,
-    label: int | None = None,
     threshold: float | None = None,
     notes: tuple[str, ...] = (),
 ) -> Foreground:
     box = bounding_box(mask) or (slice(0), slice(0), slice(0))
-    return Foreground(mask[box].copy(), box, volume.values.shape, soft, label, threshold, notes)
+    return Foreground(mask[box].copy(), box, volume.values.shape, soft, None, threshold, notes)
 
 
 # ---- the components that they form
@@ -221,8 +298,9 @@ def voxel_object(inside: Foreground, found: Components, rank: int) -> VoxelObjec
     """The component of a rank, 0 being the largest."""
     box = found.boxes[rank]
     mask = np.pad(found.numbered[box] == found.number[rank], PADDING)
-    filled = ndi.binary_fill_holes(mask)
-    cavities = int(ndi.label(filled & ~mask)[1])
+    outside = np.empty(mask.shape, np.int32)
+    cavities = int(ndi.label(~mask, output=outside)) - 1
+    filled = outside != outside[0, 0, 0]
     start = [outer.start + inner.start for outer, inner in zip(inside.box, box, strict=True)]
     stop = [outer.start + inner.stop for outer, inner in zip(inside.box, box, strict=True)]
     border = [f"{axis} low" for axis, at in zip("xyz", start, strict=True) if at == 0]

@@ -7,9 +7,13 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array
 from skimage.measure import marching_cubes
 
-from drkid.mesh import Bools, Floats, TriMesh
+from drkid.mesh import Bools, Floats, Ints, TriMesh
 from drkid.surface.bodies import outermost
 from drkid.surface.pinched_vertex import split_pinched
+
+UNBIASED, JOINED = 0.0, 0.4
+"""What a background voxel counts as, an object's being 1 and the level 0.5: ambiguous cubes are then decided by
+Lewiner's tests alone, or for the object, which is 26-connected because the background is nearer to the level."""
 
 LEAST_FRACTION = 0.02  # of a grid edge between a vertex and a voxel centre: no face can shrink to nothing
 
@@ -17,23 +21,32 @@ LEAST_FRACTION = 0.02  # of a grid edge between a vertex and a voxel centre: no 
 def grid_surface(mask: Bools) -> tuple[TriMesh, int]:
     """The mask's outermost surface in voxel indices, faces outwards, and how many other bodies were dropped.
 
-    Object 1, background 0, level 0.5, so that Lewiner's tests decide the ambiguous cubes without a bias. In noise his
-    ties can leave a hole; then the cubes are decided for the object (26-connected: the background nearer to the level
-    than the object), which is always closed.
+    Lewiner's tests decide the ambiguous cubes without a bias. In noise his ties can leave a hole; then the cubes are
+    decided for the object, which is always closed.
 
     Args:
         mask: (x, y, z), with background on every side.
     """
-    mesh = _lewiner(mask, 0.0)
-    if not mesh.is_closed_manifold:
-        mesh = split_pinched(_lewiner(mask, 0.4))
-    return outermost(mesh)
+    mesh = marched(mask, UNBIASED)
+    return outermost(mesh) if mesh.is_closed_manifold else joined_surface(mask)
 
 
-def _lewiner(mask: Bools, background: float) -> TriMesh:
+def joined_surface(mask: Bools) -> tuple[TriMesh, int]:
+    """The same with every ambiguous cube decided for the object: its topology is that of the 26-connected voxels."""
+    return outermost(split_pinched(marched(mask, JOINED)))
+
+
+def marched(mask: Bools, background: float) -> TriMesh:
+    """Marching cubes at level 0.5, open where the mask reaches the array's end."""
+    vertices, faces = marching(mask, background)
+    return TriMesh(vertices, faces.astype(np.int64))
+
+
+def marching(mask: Bools, background: float) -> tuple[Floats, Ints]:
+    """The same as plain arrays of vertices and faces."""
     field = np.where(mask, np.float32(1), np.float32(background))
     vertices, faces, _, _ = marching_cubes(field, 0.5, gradient_direction="ascent")
-    return TriMesh(vertices, faces.astype(np.int64))
+    return vertices, faces
 
 
 def slid(mesh: TriMesh, field: Floats) -> Floats:

@@ -1,15 +1,20 @@
 """The volume route: choose, fill, march, smooth."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from drkid.kit import LabelVolume, Source, Surface
 from drkid.mesh import Floats, TriMesh
 from drkid.progress import Progress
 from drkid.spec import KitSpec
+from drkid.surface.handle import Closing, without_handles
 from drkid.surface.marching_cubes import grid_surface, slid
 from drkid.surface.staircase import without_staircase
 from drkid.voxels import Components, Foreground, VoxelObject, Voxels, chosen_component, components, foreground
 from drkid.voxels import voxel_object as object_of
+
+MOST_TOLD = 12  # closings that are told one by one
 
 
 def surface_of_volume(volume: LabelVolume, spec: KitSpec, progress: Progress) -> Surface:
@@ -17,13 +22,18 @@ def surface_of_volume(volume: LabelVolume, spec: KitSpec, progress: Progress) ->
 
     Raises:
         SpecError: label and threshold contradict each other or the volume.
-        InputError: no such label or component, nothing inside, or too few voxels.
+        InputError: no such label or component, nothing inside, too few voxels, or more handles than can be closed.
     """
     progress("choosing the object", 0.0)
     inside = foreground(volume, spec)
     found = components(inside.mask)
     rank = chosen_component(found, spec)
     taken = object_of(inside, found, rank)
+    closed: tuple[Closing, ...] = ()
+    if spec.max_genus is not None:
+        progress("closing handles", 0.2)
+        mask, closed = without_handles(taken.mask, spec.max_genus, np.asarray(volume.spacing))
+        taken = replace(taken, mask=mask)
     progress("marching cubes", 0.3)
     grid, other_bodies = grid_surface(taken.mask)
     progress("removing the staircase", 0.5)
@@ -39,7 +49,13 @@ def surface_of_volume(volume: LabelVolume, spec: KitSpec, progress: Progress) ->
         debris_dropped=len(found.voxels) - 1 + other_bodies,
         touches_border=bool(taken.border),
         max_displacement_voxels=moved,
-        notes=(*volume.notes, *inside.notes, *_notes(found, rank, taken), *_notes_of(mesh, moved)),
+        notes=(
+            *volume.notes,
+            *inside.notes,
+            *_notes(found, rank, taken),
+            *_closings(closed, taken, volume),
+            *_notes_of(mesh, moved),
+        ),
     )
 
 
@@ -88,11 +104,29 @@ def _notes(found: Components, rank: int, taken: VoxelObject) -> list[str]:
     return notes
 
 
+def _closings(closed: tuple[Closing, ...], taken: VoxelObject, volume: LabelVolume) -> list[str]:
+    unit = volume.unit or "units"
+    notes = [
+        f"{'a handle' if one.handles == 1 else f'{one.handles} handles'} closed (--max-genus): "
+        f"{one.voxels} voxel{'s' * (one.voxels > 1)} {one.way} at "
+        f"({', '.join(f'{x:.4g}' for x in (one.centre + taken.origin) * volume.spacing)}) {unit}, "
+        f"{one.across:.3g} {unit} across"
+        for one in closed[:MOST_TOLD]
+    ]
+    if len(closed) > MOST_TOLD:
+        left = closed[MOST_TOLD:]
+        notes.append(
+            f"{sum(one.handles for one in left)} more handles closed, with {sum(one.voxels for one in left)} voxels "
+            f"in all, {max(one.across for one in left):.3g} {unit} across at most"
+        )
+    return notes
+
+
 def _notes_of(mesh: TriMesh, moved: float) -> list[str]:
     notes: list[str] = []
     if mesh.genus:
         handles = f"{mesh.genus} handle{'s' * (mesh.genus > 1)}"
-        notes.append(f"the surface has {handles}; where they are noise, close the holes of the segmentation first")
+        notes.append(f"the surface has {handles}; where they are noise, --max-genus closes the smallest ones")
     if moved:
         notes.append(f"the staircase of voxels is removed: nothing moved by more than {moved:.2f} voxels")
     return notes

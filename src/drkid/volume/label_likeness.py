@@ -3,7 +3,7 @@
 import numpy as np
 
 from drkid.kit import VolumeKind
-from drkid.voxels import Voxels, label_counts, slabs
+from drkid.voxels import LARGEST_TABLE, Voxels, label_counts, slabs
 
 FEW_LABELS = 3  # up to here the values of an integer volume are taken as labels without a look at neighbours
 SAMPLE_VOXELS = 1 << 22
@@ -49,6 +49,9 @@ def _label_like(values: Voxels) -> bool:
         one, two = one[both], two[both]
         here += [one, two]
         same += [one == two] * 2
-    _, index, pairs = np.unique(np.concatenate(here), return_inverse=True, return_counts=True)
-    equal = np.bincount(index, weights=np.concatenate(same), minlength=len(pairs))
-    return bool((equal > 0.5 * pairs).mean() >= 0.5) if len(pairs) else True
+    labels = np.concatenate(here)
+    if labels.size and labels.max() > LARGEST_TABLE:
+        labels = np.unique(labels, return_inverse=True)[1]
+    pairs = np.bincount(labels.astype(np.int32))
+    equal = np.bincount(labels[np.concatenate(same)].astype(np.int32), minlength=len(pairs))
+    return bool((equal > 0.5 * pairs)[pairs > 0].mean() >= 0.5) if len(labels) else True

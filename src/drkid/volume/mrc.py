@@ -7,6 +7,7 @@ from typing import Any
 
 import mrcfile
 import numpy as np
+from numpy.typing import NDArray
 
 from drkid.volume.stored import Stored
 
@@ -15,11 +16,11 @@ FAULTS: tuple[type[Exception], ...] = (OSError, EOFError, ValueError, TypeError,
 
 def read(path: Path) -> Stored:
     """The map; its spacing is cell size over sampling, in ångström. Odd headers are read as far as they make sense."""
-    with warnings.catch_warnings(record=True, action="always") as caught, mrcfile.open(path, permissive=True) as file:
+    with warnings.catch_warnings(record=True, action="always") as caught, _opened(path) as file:
         header: Any = file.header
         if file.data is None or header is None:
             raise ValueError("; ".join(str(warning.message) for warning in caught) or "no data")
-        values = np.array(file.data)
+        values = _values(path, file)
         cell = [float(header.cella[axis]) for axis in "xyz"]
         sampling = [int(header[name]) for name in ("mx", "my", "mz")]
         order = [int(header[name]) for name in ("maps", "mapr", "mapc")]
@@ -30,3 +31,16 @@ def read(path: Path) -> Stored:
     )
     axes = "".join("xyz"[axis - 1] for axis in order) if sorted(order) == [1, 2, 3] else "zyx"
     return Stored(values, "t" * (values.ndim - 3) + axes[-values.ndim :], (x, y, z), "angstrom", notes)
+
+
+def _opened(path: Path) -> Any:
+    if path.suffix.lower() == ".gz":
+        return mrcfile.open(path, permissive=True)
+    return mrcfile.mmap(path, mode="r", permissive=True)
+
+
+def _values(path: Path, file: Any) -> NDArray[Any]:
+    """The map, mapped into memory where the file is not compressed."""
+    if path.suffix.lower() == ".gz" or not isinstance(file.data, np.memmap):
+        return np.array(file.data)
+    return np.memmap(path, file.data.dtype, "r", int(file.data.offset), file.data.shape)

@@ -2,12 +2,14 @@
 
 import zlib
 from pathlib import Path
+from typing import Any
 
 import nibabel as nib
 import numpy as np
 from nibabel.filebasedimages import ImageFileError
 from nibabel.nifti1 import Nifti1Image
 from nibabel.spatialimages import HeaderDataError
+from numpy.typing import NDArray
 
 from drkid.volume.physical_unit import in_known_unit
 from drkid.volume.stored import Stored
@@ -30,7 +32,7 @@ def read(path: Path) -> Stored:
     if not isinstance(image, Nifti1Image):
         message = f"it is {type(image).__name__}, not NIfTI"
         raise ImageFileError(message)
-    values = np.asanyarray(image.dataobj)
+    values = _values(image.dataobj)
     sizes = [float(f"{size:.7g}") for size in (*image.header.get_zooms(), 1.0, 1.0)[:3]]  # stored as float32
     name = str(image.header.get_xyzt_units()[0])
     notes = [] if name != "unknown" else ["the header names no unit: millimetres taken (--unit)"]
@@ -38,3 +40,8 @@ def read(path: Path) -> Stored:
         notes.append("the header's affine mirrors the voxel axes: the kit is the mirror image of it")
     spacing, unit = in_known_unit(sizes, ["mm" if name == "unknown" else name] * 3)
     return Stored(values, ("xyzt" + "c" * values.ndim)[: values.ndim], spacing, unit, tuple(notes))
+
+
+def _values(proxy: Any) -> NDArray[Any]:
+    """Stored numbers, mapped where the file is not compressed; numbers that the header scales as float32, not 64."""
+    return np.asanyarray(proxy) if (proxy.slope, proxy.inter) == (1, 0) else proxy.get_scaled(np.float32)

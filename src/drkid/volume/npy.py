@@ -11,6 +11,5 @@ FAULTS: tuple[type[Exception], ...] = (OSError, EOFError, ValueError, MemoryErro
 
 
 def read(path: Path) -> Stored:
-    """The array; pickled objects are refused."""
-    values = np.lib.format.open_memmap(path, mode="r")
-    return Stored(np.array(values), "", None, None)
+    """The array, mapped into memory and not read; pickled objects are refused."""
+    return Stored(np.lib.format.open_memmap(path, mode="r"), "", None, None)

@@ -84,7 +84,7 @@ def _broken(name: str, suffix: str, error: Exception) -> InputError:
 def _refuse_non_finite(values: Voxels, name: str) -> None:
     if values.dtype.kind != "f":
         return
-    count = sum(int(np.count_nonzero(~np.isfinite(np.asarray(slab, np.float64)))) for slab in slabs(values))
+    count = sum(int(np.count_nonzero(~np.isfinite(slab))) for slab in slabs(values))
     if count:
         raise InputError(
             f"{name} holds values that are no numbers",

@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import tifffile
+from numpy.typing import NDArray
 
 from drkid.spec import Unit
 from drkid.volume.physical_unit import in_known_unit
@@ -42,7 +43,7 @@ def read(path: Path) -> Stored:
     """
     with _complaints() as complaints, tifffile.TiffFile(path) as file:
         series = file.series[0]
-        values, axes = np.asarray(series.asarray()), _axes(series.axes, series.shape)
+        values, axes = _values(path, file, series), _axes(series.axes, series.shape)
         if file.is_ome and file.ome_metadata:
             spacing, unit = _ome_spacing(file.ome_metadata)
         elif file.is_imagej and file.imagej_metadata:
@@ -53,6 +54,14 @@ def read(path: Path) -> Stored:
     if broken:
         raise tifffile.TiffFileError(broken[0])
     return Stored(values, axes, spacing, unit, tuple(f"the header is odd: {text}" for text in complaints))
+
+
+def _values(path: Path, file: tifffile.TiffFile, series: Any) -> NDArray[Any]:
+    """The pixels, mapped where they lie in the file one after the other and uncompressed."""
+    if series.dataoffset is None:
+        return np.asarray(series.asarray())
+    stored = np.dtype(file.byteorder + series.dtype.char)
+    return np.memmap(path, stored, "r", int(series.dataoffset), series.shape)
 
 
 @contextmanager

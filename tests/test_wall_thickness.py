@@ -1,0 +1,112 @@
+"""Walls: how thick, and whether pieces are small enough for them."""
+
+import re
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drkid.errors import InputError
+from drkid.kit import Source, Surface
+from drkid.mesh import TriMesh
+from drkid.pipeline import make_kit, read_surface
+from drkid.remesh import simplify
+from drkid.spec import KitSpec
+from drkid.wall_thickness import even_edge, faces_that_resolve, require_walls, wall_thickness
+
+
+def plate(thickness: float, bend: float = 0.0) -> TriMesh:
+    """20 × 20 and thin, finely meshed; bent to a wave of an amplitude."""
+    box = trimesh.creation.box((20, 20, thickness)).subdivide_to_size(1.0)
+    vertices = np.array(box.vertices)
+    vertices[:, 2] += bend * np.sin(vertices[:, 0] / 3)
+    mesh = trimesh.Trimesh(vertices, box.faces)
+    return TriMesh(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+
+
+def test_a_plate_is_as_thick_as_it_is(potato):
+    found = wall_thickness(plate(3.0))
+    assert np.median(found) == pytest.approx(3.0)
+    assert np.isfinite(wall_thickness(potato)).mean() > 0.5
+
+
+@given(st.floats(0.01, 100))
+def test_the_verdict_does_not_depend_on_the_unit(scale):
+    for mesh, fits in ((plate(3.0), True), (plate(0.5), False)):
+        if fits:
+            assert require_walls(mesh.scaled(scale), 172) == require_walls(mesh, 172)
+        else:
+            with pytest.raises(InputError, match="too thin for 172 pieces"):
+                require_walls(mesh.scaled(scale), 172)
+
+
+def test_the_faces_that_are_named_resolve_it():
+    sheet = plate(0.6, bend=2.0)
+    with pytest.raises(InputError) as caught:
+        require_walls(sheet, 100)
+    named = re.search(r"--faces (\d+) or more", str(caught.value))
+    assert named is not None
+    require_walls(sheet, int(named[1]))
+    with pytest.raises(InputError):
+        require_walls(sheet, int(named[1]) - 20)
+    simplified = simplify(Surface(sheet, Source("sheet", "0" * 64)), KitSpec(faces=int(named[1]))).mesh
+    assert simplified.is_closed_manifold
+
+
+def test_absurdly_many_faces_are_called_a_sheet():
+    with pytest.raises(InputError, match=r"a sheet, not a body"):
+        require_walls(plate(0.1), 172)
+
+
+def test_what_is_thin_in_places_is_told_with_the_faces_that_help():
+    (note,) = require_walls(plate(1.0), 172)
+    found = re.match(r"(\d+) % of the surface .* (\d+) faces would resolve", note)
+    assert found is not None
+    assert int(found[1]) > 50
+    assert require_walls(plate(1.0), int(found[2])) == ()
+
+
+def test_faces_and_edges_are_inverse():
+    for thickness in (0.1, 2.0, 31.0):
+        faces = faces_that_resolve(500.0, thickness, 0.5)
+        assert even_edge(500.0, faces) * 0.5 <= thickness < even_edge(500.0, faces - 2) * 0.5
+
+
+def test_make_refuses_a_sheet_before_it_works(tmp_path):
+    mesh = plate(0.5)
+    trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(tmp_path / "sheet.stl")
+    with pytest.raises(InputError, match="too thin for 172 pieces"):
+        make_kit(tmp_path / "sheet.stl", KitSpec())
+
+
+# ---- real shapes
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "urocell_mito_bean.nii.gz",
+        "urocell_mito_elongated.nii.gz",
+        "golgi_vesicle.mrc",
+        "emdb_soft_mask.map",
+        "celegans_embryo_cell.ply",
+        "asteroid_itokawa.obj",
+        "spot_uv_seams.obj",
+        "urocell_mito_branched.nii.gz",
+        "urocell_mito_genus3.nii.gz",
+        "emd_1832_density.map",
+        "torus_genus1.stl",
+    ],
+)
+def test_bodies_are_not_refused(name, shared_data):
+    mesh = read_surface(shared_data / name, KitSpec(smooth=False)).mesh
+    for faces in (120, 172, 500):
+        require_walls(mesh, faces)
+
+
+def test_the_sheet_is_refused_with_the_faces_that_would_resolve_it(shared_data):
+    mesh = read_surface(shared_data / "er_thin_sheet.mrc.gz", KitSpec(smooth=False)).mesh
+    with pytest.raises(InputError, match=r"too thin for 172 pieces.*found: 9\d % .*faces"):
+        require_walls(mesh, 172)
