@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from plain_linearisation import plain_offsets
 
-from drkid.congruence.target import Target, signed_offsets, smoothness, through_vertices
+from drkid.congruence.target import Target, signed_offsets, smoothness
 from drkid.mesh import TriMesh
 
 RADIUS = 2.0
@@ -126,16 +126,3 @@ def test_smoothness_charges_a_vertex_for_what_its_umbrella_does():
     assert valence == 5
     expected = 4 + 0.5**2 * 4 * (1 + valence / 25)
     assert lifted @ smoothness(mesh, 0.5) @ lifted == pytest.approx(expected)
-
-
-def test_target_passes_through_vertices_that_stand_off(ball):
-    coarse = trimesh.creation.icosphere(subdivisions=2, radius=1.03 * RADIUS)
-    simplified = TriMesh(np.asarray(coarse.vertices), np.asarray(coarse.faces))
-    before, _ = ball.offsets(simplified.vertices)
-    after, _ = through_vertices(ball.mesh, simplified).offsets(simplified.vertices)
-    assert np.abs(before).min() > 0.02 * RADIUS
-    np.testing.assert_allclose(after, 0, atol=1e-3 * RADIUS)
-
-
-def test_target_is_the_surface_where_vertices_lie_on_it(potato):
-    assert through_vertices(potato, potato).mesh is potato

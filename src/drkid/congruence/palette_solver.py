@@ -38,7 +38,7 @@ from drkid.congruence.levenberg_marquardt import Freedom
 from drkid.congruence.palette import Palette, palette_of_classes
 from drkid.congruence.score import Yardstick
 from drkid.congruence.solver import Candidate
-from drkid.congruence.target import Target, through_vertices
+from drkid.congruence.target import Target
 from drkid.congruence.triangle_space import ascending_lengths, clustering_error
 from drkid.kit import Convergence, Outcome
 from drkid.mesh import TriMesh, read_only
@@ -110,7 +110,7 @@ class PaletteSolver:
         with threadpool_limits(1):
             palette = palette_of(self.spec, unit, np.random.default_rng([self.spec.seed, 0, STARTS]), large=large)
         free: Freedom = "scale" if palette.held else "all"
-        target = through_vertices(self.surface.scaled(1 / scale), unit)
+        target = Target(self.surface.scaled(1 / scale))
         problem = Problem(target, palette, free if mesh.genus == 0 else "none", mesh.genus == 0)
         yardstick = Yardstick(unit, self.spec)
         dense = len(mesh.faces) <= MOST_DENSE_FACES

@@ -10,7 +10,6 @@ from numba import njit
 from drkid.congruence.closest_point import TriangleTree, closest_slots, triangle_tree
 from drkid.mesh import Floats, Ints, TriMesh
 
-ON_SURFACE = 1e-6  # of the mean edge: vertices that are nearer lie on the surface
 NORMAL_SMOOTHING = 5  # rounds of averaging of the target's vertex normals: voxels leave ripples in them
 
 
@@ -55,11 +54,11 @@ class Target:
     @cached_property
     def surface(self) -> Surface:
         """In arrays, for kernels."""
-        return Surface(triangle_tree(self.mesh), np.array(self.mesh.faces), self.normals)
+        return Surface(triangle_tree(self.mesh), np.array(self.mesh.faces), self._normals)
 
     @cached_property
-    def normals(self) -> Floats:
-        """(V, 3): unit vertex normals, averaged with their neighbours a few times."""
+    def _normals(self) -> Floats:
+        """(V, 3): vertex normals, averaged with their neighbours a few times."""
         normals, edges = self.mesh.vertex_normals.copy(), self.mesh.edges
         for _ in range(NORMAL_SMOOTHING):
             total = normals.copy()
@@ -71,22 +70,6 @@ class Target:
     def offsets(self, points: Floats) -> tuple[Floats, Floats]:
         """Signed distance (n,) of points (n, 3) along the target's normals (n, 3), positive outside."""
         return signed_offsets(self.surface, np.array(points, order="C"), np.zeros(len(points), np.int64))
-
-
-def through_vertices(surface: TriMesh, simplified: TriMesh) -> Target:
-    """The target on which the vertices of M_s lie: M_i, moved along its normals by the offset that M_s has there.
-
-    M_s straddles M_i: on convex ground its vertices lie outside, so that its faces are not inside everywhere. Vertices
-    of M_f that were held to M_i itself would give that up. Offsets of the vertices are interpolated over the faces.
-    """
-    there = Target(surface)
-    offsets, _ = there.offsets(simplified.vertices)
-    if np.abs(offsets).max() < ON_SURFACE * simplified.mean_edge:
-        return there
-    tree, slots = triangle_tree(simplified), np.zeros(len(surface.vertices), np.int64)
-    _, weights = closest_slots(tree, surface.vertices, slots)
-    moved = np.einsum("vc,vc->v", offsets[simplified.faces[tree.face[slots]]], weights)
-    return Target(TriMesh(surface.vertices + moved[:, None] * there.normals, surface.faces))
 
 
 def smoothness(mesh: TriMesh, beta: float) -> Floats:
