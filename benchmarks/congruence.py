@@ -106,8 +106,9 @@ def measured(run: Run, *, beside: bool) -> dict:
         decompose(warm, KitSpec(method=method, classes=2, rounds=1, max_iterations=10))
     spec = run.spec
     surface = read_surface(require_data() / run.shape, spec)
-    simplified = simplify(surface, spec).mesh
-    found, curve = searched(PaletteSolver(spec, surface.mesh), simplified)
+    remeshed = simplify(surface, spec)
+    simplified = remeshed.mesh
+    found, curve = searched(PaletteSolver(spec, remeshed.target), simplified)
     row = {
         "shape": run.shape,
         "palette": run.palette or "universal",
