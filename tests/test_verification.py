@@ -118,10 +118,6 @@ def joint_of_no_sides(document):
     document["joints"][0]["edge"] = document["pieces"][0]["corners"][:1] * 2
 
 
-def wrong_angle(document):
-    document["joints"][0]["dihedral_degrees"] -= 10
-
-
 @pytest.mark.parametrize(
     ("change", "name"),
     [
@@ -132,9 +128,8 @@ def wrong_angle(document):
         (shorter_border, "building"),
         (longer_class, "corners of the parts"),
         (larger_part, "drift"),
-        (displaced_connector, "virtual assembly"),
+        (displaced_connector, "drift"),
         (joint_of_no_sides, "virtual assembly"),
-        (wrong_angle, "swing of the joints"),
         (metric("error_max", 0.9), "largest error, mm"),
         (metric("error_mean_percent", 1.01), "mean error, %"),
         (metric("mean_edge", 1.001), "mean edge, mm"),
@@ -177,10 +172,9 @@ def test_a_part_whose_solid_lies_off_its_frame_is_found(copy, kit):
 
 
 def test_a_kit_that_states_no_assembly_has_to_close(copy):
+    """Four classes within 5 % leave gaps of more than a millimetre."""
     edit(copy, lambda document: document["metrics"].pop("assembly"))
-    assert verify_kit(copy).passed
-    edit(copy, displaced_connector)
-    assert "virtual assembly" in failures(copy)
+    assert failures(copy) == {"virtual assembly"}
 
 
 def test_a_surface_with_a_hole_is_found(copy, kit):

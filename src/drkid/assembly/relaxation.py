@@ -69,15 +69,14 @@ def _step(framework: HingeFramework, placements: Floats, gaps: Floats, damping: 
     straight = factors.solve(pull)
     bent = matrix.T @ bending(framework, placements, straight.reshape(-1, 6), arm).ravel()
     bend = factors.solve(np.asarray(-bent, np.float64))
-    step: Floats = np.real(straight + bend / 2)
-    return step.reshape(-1, 6)
+    return (straight + bend / 2).reshape(-1, 6)
 
 
 def bending(framework: HingeFramework, placements: Floats, step: Floats, arm: float) -> Floats:
     """(J, 2, 3): second derivative of the gaps along a step (P, 6): an arm p turning by ω bends by ω × (ω × p)."""
     placed, turn = placements[framework.pieces], step[framework.pieces][:, :, None, :3] / arm
     arms = np.einsum("jsab,jseb->jsea", placed[..., :3, :3], framework.ends)
-    bent = np.cross(turn, np.cross(turn, arms))
+    bent = np.asarray(np.cross(turn, np.cross(turn, arms)), np.float64)
     return bent[:, 0] - bent[:, 1]
 
 
