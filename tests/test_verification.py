@@ -80,9 +80,56 @@ def with_another_softest_mode(document):
     document["metrics"]["rigidity"]["softest"] += 1e-3
 
 
+def better_verdict(document):
+    closure = document["metrics"]["assembly"]["closure"]
+    closure["verdict"] = "closes" if closure["verdict"] != "closes" else "closes with strain"
+
+
+def straighter(document):
+    document["metrics"]["assembly"]["closure"]["drift"]["max_mm"] *= 0.5
+
+
+def roomier(document):
+    document["metrics"]["assembly"]["closure"]["budget"]["reserve_mm"] += 0.1
+
+
+def looser(document):
+    document["metrics"]["assembly"]["swing"]["inward_degrees"] += 1
+
+
+def shorter_border(document):
+    document["metrics"]["assembly"]["building"]["border_mean_mm"] *= 0.9
+
+
+def longer_class(document):
+    document["classes"][0]["edge_lengths"] = [1.1 * x for x in document["classes"][0]["edge_lengths"]]
+
+
+def larger_part(document):
+    for part in document["classes"][0]["parts"]:
+        part["corners"] = [[1.1 * x for x in corner] for corner in part["corners"]]
+
+
+def displaced_connector(document):
+    document["classes"][0]["parts"][0]["sides"][0]["connector_frame"][7] += 2
+
+
+def joint_of_no_sides(document):
+    document["joints"][0]["edge"] = document["pieces"][0]["corners"][:1] * 2
+
+
 @pytest.mark.parametrize(
     ("change", "name"),
     [
+        (better_verdict, "virtual assembly"),
+        (straighter, "drift"),
+        (roomier, "tolerance budget"),
+        (looser, "swing of the joints"),
+        (shorter_border, "building"),
+        (longer_class, "corners of the parts"),
+        (larger_part, "drift"),
+        (displaced_connector, "drift"),
+        (joint_of_no_sides, "virtual assembly"),
         (metric("error_max", 0.9), "largest error, mm"),
         (metric("error_mean_percent", 1.01), "mean error, %"),
         (metric("mean_edge", 1.001), "mean edge, mm"),
@@ -115,6 +162,19 @@ def test_an_assembly_whose_rigidity_cannot_be_computed_fails(copy, monkeypatch):
 
     monkeypatch.setattr(verification, "rigidity", degenerate)
     assert failures(copy) == {"rigidity"}
+
+
+def test_a_part_whose_solid_lies_off_its_frame_is_found(copy, kit):
+    mesh = kit.part_set.parts[0].solid.mesh()
+    file = next((copy / "parts").glob("A*.stl"))
+    file.write_bytes(stl_bytes(mesh.moved(mesh.vertices + np.array([1.0, 0.0, 0.0]))))
+    assert "swing of the joints" in failures(copy)
+
+
+def test_a_kit_that_states_no_assembly_has_to_close(copy):
+    """Four classes within 5 % leave gaps of more than a millimetre."""
+    edit(copy, lambda document: document["metrics"].pop("assembly"))
+    assert failures(copy) == {"virtual assembly"}
 
 
 def test_a_surface_with_a_hole_is_found(copy, kit):

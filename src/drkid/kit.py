@@ -251,7 +251,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Gaps:
-    """How far the two axes of a hinge lie apart at the hinge's ends, over all hinges, in mm."""
+    """How far the axes of two joined sides lie apart at their ends, the farther of the two, over all hinges, in mm."""
 
     mean_mm: float
     p95_mm: float

@@ -48,7 +48,6 @@ def structure_of(folder: Path, assembled: TriMesh, kit: KitDocument) -> Structur
         bend_radians=np.radians([180 - joint.dihedral_degrees for joint in kit.joints]),
         connector=kit.spec["connector"],
         connectors=[_solid(folder / name) for name in connectors],
-        hinge_mm=max((item.length or 0.0 for item in kit.hardware), default=0.0),
         play=_play(kit),
     )
 

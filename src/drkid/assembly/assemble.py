@@ -51,7 +51,6 @@ def assemble(mesh_mm: TriMesh, part_set: PartSet, progress: Progress = silent, s
         bend_radians=bend,
         connector=part_set.dimensions.connector,
         connectors=[connector.solid for connector in part_set.connectors],
-        hinge_mm=part_set.dimensions.rod_length_mm,
         play=_play(part_set.dimensions, spec),
     )
     return _proven(structure, pieces, joints, part_set.dimensions, spec, progress)

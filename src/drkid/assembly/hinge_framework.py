@@ -14,8 +14,8 @@ class HingeFramework:
     """What the hinges say about where pieces lie, and nothing else.
 
     Joint j joins pieces `pieces[j]` (J, 2). `frames` (J, 2, 4, 4) take connector to part coordinates on either side,
-    `half_lengths` (J,) is half the length of the axis that both share, `bend_radians` (J,) the angle between the two
-    pieces' normals, positive where convex.
+    `half_lengths` (J, 2) are half the lengths of the two sides, `bend_radians` (J,) is the angle between the pieces'
+    normals, positive where convex.
     """
 
     count: int
@@ -26,11 +26,12 @@ class HingeFramework:
 
     @property
     def ends(self) -> Floats:
-        """(J, 2, 2, 3): for either side of each joint both ends of the axis, which are to coincide, in its part frame.
+        """(J, 2, 2, 3): for either side of each joint both ends of its axis, which are to coincide, in its part frame.
 
-        The connector's x axis runs along its own piece's outline, so that the two pieces see it the other way round.
+        The axis is as long as its own side. The connector's x axis runs along its own piece's outline, so that the two
+        pieces see it the other way round.
         """
-        along = self.half_lengths[:, None, None] * self.frames[..., :3, 0]
+        along = self.half_lengths[..., None] * self.frames[..., :3, 0]
         signed = np.stack([along[:, 0], -along[:, 1]], axis=1)
         middle = self.frames[..., :3, 3]
         return read_only(np.stack([middle - signed, middle + signed], axis=2))
@@ -47,21 +48,16 @@ def hinge_framework(
     corners: Sequence[Floats],
     side_frames: Sequence[Floats],
     bend_radians: Floats,
-    hinge_mm: float = 0.0,
 ) -> HingeFramework:
-    """The framework of a graph whose piece p has `corners[p]` (n, 3) and `side_frames[p]` (n, 4, 4) in its part frame.
-
-    The axis is as long as the hinge, `hinge_mm`, or as the shorter of the two sides where that is less or 0 is given.
-    """
+    """The framework of a graph whose piece p has `corners[p]` (n, 3) and `side_frames[p]` (n, 4, 4) in its frame."""
     joints = list(zip(graph.pieces.tolist(), graph.sides.tolist(), strict=True))
     frames = np.array([[side_frames[p][i] for p, i in zip(*joint, strict=True)] for joint in joints])
     lengths = [np.linalg.norm(np.roll(c, -1, axis=0) - c, axis=1) for c in corners]
-    sides = np.array([min(lengths[p][i] for p, i in zip(*joint, strict=True)) for joint in joints])
-    axis = np.minimum(sides, hinge_mm) if hinge_mm > 0 else sides
+    sides = np.array([[lengths[p][i] for p, i in zip(*joint, strict=True)] for joint in joints])
     return HingeFramework(
         len(graph.outlines),
         graph.pieces,
         read_only(frames.reshape(-1, 2, 4, 4)),
-        read_only(axis / 2),
+        read_only(sides / 2),
         read_only(np.asarray(bend_radians, np.float64)),
     )

@@ -1,7 +1,7 @@
 """Relaxation: where rigid pieces come to lie when all their hinges pull at once.
 
-Six unknowns for each piece, a turn and a shift; six equations for each hinge, of which one says only that both sides
-have an axis of one length. The squares of the gaps are made least by Gauss and Newton's method with Levenberg's
+Six unknowns for each piece, a turn and a shift; six equations for each hinge, of which one says that both sides are
+of one length. The squares of the gaps are made least by Gauss and Newton's method with Levenberg's
 damping, which also leaves out the six motions of the whole; steps by a sparse factorisation of the normal matrix. In
 a soft shell the curvature of the gaps, which Gauss and Newton leave out, matters as much as what they keep: it is
 block-diagonal, so it is added wherever the matrix stays positive definite with it (Newton's method). Such a shell's
@@ -62,20 +62,21 @@ def _step(framework: HingeFramework, placements: Floats, gaps: Floats, damping: 
     arm = arm_length(framework)
     matrix = jacobian(framework, placements, arm)
     normal = csc_array(matrix.T @ matrix)
-    pull = -(matrix.T @ gaps.ravel())
+    pull = np.asarray(-(matrix.T @ gaps.ravel()), np.float64)
     factors = factorised(normal + curvature(framework, placements, gaps, arm), damping)
     if (factors.U.diagonal() <= 0).any():  # pivots on the diagonal: as many negative ones as negative eigenvalues
         factors = factorised(normal, damping)
     straight = factors.solve(pull)
-    bend = factors.solve(-(matrix.T @ bending(framework, placements, straight.reshape(-1, 6), arm).ravel()))
-    return np.asarray(straight + bend / 2, np.float64).reshape(-1, 6)
+    bent = matrix.T @ bending(framework, placements, straight.reshape(-1, 6), arm).ravel()
+    bend = factors.solve(np.asarray(-bent, np.float64))
+    return (straight + bend / 2).reshape(-1, 6)
 
 
 def bending(framework: HingeFramework, placements: Floats, step: Floats, arm: float) -> Floats:
     """(J, 2, 3): second derivative of the gaps along a step (P, 6): an arm p turning by ω bends by ω × (ω × p)."""
     placed, turn = placements[framework.pieces], step[framework.pieces][:, :, None, :3] / arm
     arms = np.einsum("jsab,jseb->jsea", placed[..., :3, :3], framework.ends)
-    bent = np.cross(turn, np.cross(turn, arms))
+    bent = np.asarray(np.cross(turn, np.cross(turn, arms)), np.float64)
     return bent[:, 0] - bent[:, 1]
 
 

@@ -34,8 +34,7 @@ class Structure:
 
     Piece p is made from `shapes[parts[p]]`, lies at `placements[p]` and belongs with its corners at `targets[p]`;
     `faces[p]` is a face of M_f that it covers. `bend_radians` (J,) are the joints' angles, positive where convex.
-    `connectors` are the hinge's halves, the first and the last for either side of a joint, or the one key, or none;
-    `hinge_mm` is the length of the hinges, 0 where sides meet along their whole length.
+    `connectors` are the hinge's halves, the first and the last for either side of a joint, or the one key, or none.
     """
 
     graph: PieceGraph
@@ -47,7 +46,6 @@ class Structure:
     bend_radians: Floats
     connector: ConnectorKind
     connectors: Sequence[Solid]
-    hinge_mm: float
     play: Play
 
     @cached_property
@@ -55,7 +53,7 @@ class Structure:
         """What the hinges alone say."""
         corners = [self.shapes[part].corners for part in self.parts]
         frames = [self.shapes[part].side_frames for part in self.parts]
-        return hinge_framework(self.graph, corners, frames, self.bend_radians, self.hinge_mm)
+        return hinge_framework(self.graph, corners, frames, self.bend_radians)
 
     @cached_property
     def joint_lengths(self) -> Floats:

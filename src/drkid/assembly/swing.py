@@ -8,7 +8,7 @@ from drkid.assembly.hinge_framework import HingeFramework
 from drkid.kit import Swing
 from drkid.mesh import Floats, Ints
 
-ROUNDING_DEGREES = 1e-6
+ROUNDING_DEGREES = 1e-3  # corners in single precision, seen from an axis near by
 NEAR_AXIS_MM = 1e-6  # nearer to the axis than this a corner has no direction
 
 

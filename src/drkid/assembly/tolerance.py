@@ -14,7 +14,6 @@ from drkid.mesh import Floats, Ints
 DAMPING = 1e-10  # of the normal matrix's mean diagonal: leaves out the motions of the whole
 MOST_EXACT = 300  # pieces up to which (JᵀJ)⁻¹ is written out and H is exact; it takes time as their cube
 SAMPLES, SAMPLING_SEED = 100, 20_240  # beyond: prints that are drawn, good to 7 %
-ACROSS_AND_ALONG = 2.5  # directions in which an axis end errs: two across, and along the axis one for both ends
 
 
 class Response:
@@ -33,14 +32,15 @@ class Response:
     def scattered(self, accuracy: float) -> Floats:
         """(J, 2): root mean square gap at each axis end where every printed side errs on its own.
 
-        A side's axis errs by a normal deviate of `accuracy` across it, at either end in either direction, and by
-        half that variance along it as a whole; two sides meet, so that the differences have twice the variance.
+        Each end of a side errs by a normal deviate of `accuracy` in each direction; two sides meet, so that their
+        differences have twice the variance.
         """
         joints = len(self.framework.pieces)
         if self._inverse is not None:
             taken = self._matrix.multiply(self._matrix @ self._inverse).sum(axis=1).reshape(joints, 2, 3).sum(axis=-1)
-            return accuracy * np.sqrt(2 * np.maximum(ACROSS_AND_ALONG - taken, 0.0))
-        rest = self._at_rest(self._drawn(SAMPLES)).reshape(joints, 2, 3, SAMPLES)
+            return accuracy * np.sqrt(2 * np.maximum(3.0 - taken, 0.0))
+        drawn = np.random.default_rng(SAMPLING_SEED).standard_normal((6 * joints, SAMPLES))
+        rest = self._at_rest(drawn).reshape(joints, 2, 3, SAMPLES)
         return accuracy * np.sqrt(2 * (rest**2).sum(axis=2).mean(axis=-1))
 
     def shared(self, moulds: Ints, accuracy: float) -> Floats:
@@ -60,29 +60,14 @@ class Response:
         moved = np.column_stack([self._factors.solve(column) for column in pull.T])
         return errors - self._matrix @ moved
 
-    def _axes(self) -> Floats:
-        """(J, 2, 3, 3): the connector's axes of either side in the world, one a column."""
-        return self.placements[self.framework.pieces][..., :3, :3] @ self.framework.frames[..., :3, :3]
-
-    def _drawn(self, count: int) -> Floats:
-        """(6J, count): deviates of unit variance across the axes, and of half of it along them, alike at both ends.
-
-        Along an axis that is one number for both ends, whose share at each is half of what moves them as a whole.
-        """
-        rng = np.random.default_rng(SAMPLING_SEED)
-        local = rng.standard_normal((len(self.framework.pieces), 2, 3, count))
-        local[:, :, 0] = local[:, :1, 0] * np.sqrt(0.5)
-        return np.einsum("jab,jebn->jean", self._axes()[:, 0], local).reshape(-1, count)
-
     def _mould_errors(self, moulds: Ints) -> Floats:
-        """(6J, 5 moulds): what a unit error of each kind of each mould's side does to the gaps."""
-        axes, joints = self._axes(), np.arange(len(moulds))
-        errors = np.zeros((len(moulds), 2, 3, int(moulds.max()) + 1, 5))
+        """(6J, 6 moulds): what a unit error of each end in each direction of each mould's side does to the gaps."""
+        axes = self.placements[self.framework.pieces][..., :3, :3] @ self.framework.frames[..., :3, :3]
+        joints = np.arange(len(moulds))
+        errors = np.zeros((len(moulds), 2, 3, int(moulds.max()) + 1, 2, 3))
         for side, sign in ((0, 1.0), (1, -1.0)):
-            x, y, z = (sign * axes[:, side, :, i] for i in range(3))
-            first, last = (0, 1) if side == 0 else (1, 0)  # the other side sees the axis the other way round
-            for kind, (end, direction) in enumerate(((first, y), (first, z), (last, y), (last, z))):
-                errors[joints, end, :, moulds[:, side], kind] += direction
             for end in (0, 1):
-                errors[joints, end, :, moulds[:, side], 4] += np.sqrt(0.5) * x
+                own = end if side == 0 else 1 - end  # the other side sees the axis the other way round
+                for direction in range(3):
+                    errors[joints, own, :, moulds[:, side], end, direction] += sign * axes[:, side, :, direction]
         return errors.reshape(6 * len(moulds), -1)

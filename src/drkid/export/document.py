@@ -137,7 +137,7 @@ class RigidityDocument(Model):
 
 
 class GapsDocument(Model):
-    """Distance of a hinge's two axes at the hinge's ends, over all hinges."""
+    """Distance of two joined sides' axes at their ends, the larger of the two, over all hinges."""
 
     mean_mm: float = Field(ge=0)
     p95_mm: float = Field(ge=0)
