@@ -21,6 +21,7 @@ from drkid.parts.members import Members, members_of
 from drkid.parts.notes import notes
 from drkid.parts.pocket import pocket, side_frames
 from drkid.parts.prismoid import Prismoid
+from drkid.parts.process_findings import findings
 from drkid.parts.snap import snap_half
 from drkid.parts.thickening import thickened
 from drkid.progress import Progress, silent
@@ -68,6 +69,9 @@ def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress =
         face_part=face_part,
         face_turn=members.turn,
         groove_mm=read_only(groove_mm(decomposition.mesh, members, recess)),
+        findings=findings(
+            design.triangles(scale), shapes, np.unique(members.face_class).tolist(), design.dimensions, spec
+        ),
         notes=(*notes(decomposition, members, design.dimensions, spec, recess, scale), *unmarked),
     )
 
@@ -224,9 +228,8 @@ def _marked(parts: tuple[Part, ...], design: _Design) -> tuple[tuple[Part, ...],
         found, missing = marked(part, design.dimensions, spec.preset.engrave_width_mm, depth)
         made.append(found)
         hand = "" if part.handedness == "any" else f" ({part.handedness})"
-        notes_ += [
-            f"Class {class_id(part.class_index)}{hand}: no room for the {what} on its inner face." for what in missing
-        ]
+        if missing:
+            notes_.append(f"Class {class_id(part.class_index)}{hand}: no room for the {', '.join(missing)} inside.")
     return tuple(made), tuple(notes_)
 
 

@@ -15,7 +15,7 @@ from drkid.parts.detent import groove
 from drkid.parts.stroke_font import strokes
 from drkid.solid import Solid
 
-HEIGHTS = (10.0, 8.5, 7.0, 6.0, 5.0, 4.0)  # of a letter in stroke widths; the last one is the smallest to be read
+HEIGHTS = (10.0, 7.5, 5.5, 4.0)  # of a letter in stroke widths; the last one is the smallest to be read
 TICK_LENGTHS = (3.0, 2.0)  # in stroke widths
 TICK_PITCH = 2.2  # from one tick to the next, in stroke widths
 APART = 2.0  # between the middles of a letter's and a tick's strokes, in stroke widths
@@ -63,7 +63,7 @@ class _Ground:
 
 
 def marked(part: Part, dimensions: Dimensions, width_mm: float, depth_mm: float) -> tuple[Part, tuple[str, ...]]:
-    """The part with its marks, and what found no room on it: "letter" or "ticks".
+    """The part with its marks, and what found no room on it, in words.
 
     The letter is as large as room allows and reads from inside; ticks stand beside each side: one at the shortest, two
     at the next longer, three at the longest, the same number at equal sides.
@@ -76,22 +76,21 @@ def marked(part: Part, dimensions: Dimensions, width_mm: float, depth_mm: float)
 
 
 def marks(part: Part, dimensions: Dimensions, width_mm: float, depth_mm: float) -> Marks:
-    """Where the marks of a part go: the largest letter that leaves room for the ticks, else what there is room for."""
+    """Where the marks of a part go: the largest letter that leaves room for the ticks, or for most of them."""
     ground = _ground(part, dimensions, width_mm, depth_mm)
-    none = np.zeros((0, 2, 2))
-    best = Marks(none, none, ("letter", "ticks"))
+    best: Marks | None = None
     for height in HEIGHTS:
         letter = _letter(class_id(part.class_index), height * width_mm, ground, width_mm)
-        if letter is None:
-            continue
-        ticks = _ticks(part, dimensions, ground, letter, width_mm)
-        if ticks is not None:
-            return Marks(letter, ticks, ())
-        best = best if len(best.letter) else Marks(letter, none, ("ticks",))
-    if len(best.letter):
+        if letter is not None:
+            found = Marks(letter, *_ticks(part, dimensions, ground, letter, width_mm))
+            best = found if best is None or len(found.missing) < len(best.missing) else best
+            if not best.missing:
+                return best
+    if best is not None:
         return best
-    ticks = _ticks(part, dimensions, ground, none, width_mm)
-    return best if ticks is None else Marks(none, ticks, ("letter",))
+    none = np.zeros((0, 2, 2))
+    ticks, missing = _ticks(part, dimensions, ground, none, width_mm)
+    return Marks(none, ticks, ("letter", *missing))
 
 
 def side_ranks(part: Part) -> Ints:
@@ -157,28 +156,31 @@ def _letter(text: str, height_mm: float, ground: _Ground, width_mm: float) -> Fl
     return lines + places[best] if room[best] > 0 else None
 
 
-def _ticks(part: Part, d: Dimensions, ground: _Ground, letter: Floats, width_mm: float) -> Floats | None:
-    """The ticks of all sides, or None where a side has no room for its own."""
+def _ticks(
+    part: Part, d: Dimensions, ground: _Ground, letter: Floats, width_mm: float
+) -> tuple[Floats, tuple[str, ...]]:
+    """The ticks of all sides that have room for their own, and which sides have none."""
     apart = APART * width_mm
     left = ground.without(letter, apart) if len(letter) else ground
-    found: list[Floats] = []
-    for frame, rank in zip(part.side_frames, side_ranks(part), strict=True):
+    found, missing = [np.zeros((0, 2, 2))], list[str]()
+    for side, (frame, rank) in enumerate(zip(part.side_frames, side_ranks(part), strict=True), 1):
         own = next(
             (g for n in TICK_LENGTHS if (g := _own_ticks(frame, int(rank), n, d, left, width_mm)) is not None), None
         )
         if own is None:
-            return None
+            missing.append(f"ticks of side {side}")
+            continue
         found.append(own)
         left = left.without(own, apart)
-    return np.concatenate(found)
+    return np.concatenate(found), tuple(missing)
 
 
 def _own_ticks(
     frame: Floats, count: int, length: float, d: Dimensions, ground: _Ground, width_mm: float
 ) -> Floats | None:
     """The ticks of one side, nearest to the side and then to its pocket, or None where there is no room."""
-    x = d.pocket_width_mm / 2 + d.min_wall_mm + width_mm * np.arange(0.0, MOST_SHIFTS, 0.5)
-    y = np.arange(0.0, d.thickness_mm + d.pocket_depth_mm, width_mm / 2)
+    x = d.pocket_width_mm / 2 + d.min_wall_mm + width_mm * np.arange(0.0, MOST_SHIFTS)
+    y = np.arange(0.0, d.thickness_mm + d.pocket_depth_mm, width_mm)
     starts = np.stack(np.meshgrid(y, x, (1.0, -1.0), indexing="ij"), axis=-1).reshape(-1, 3)
     along = starts[:, 2:] * (starts[:, 1:2] + TICK_PITCH * width_mm * np.arange(count))
     low = np.stack([along, np.broadcast_to(starts[:, :1], along.shape)], axis=-1)
