@@ -19,6 +19,8 @@ Status = Literal["converged", "stalled"]
 Firmness = Literal["stiff", "soft", "may snap through"]
 Verdict = Literal["closes", "closes with strain", "does not close"]
 
+FINDING_TOLERANCE = 1e-6  # mm or degrees: what rounding may take from a dimension
+
 
 def class_id(index: int) -> str:
     """The letters A, B, …, Z, AA, AB, … of classes 0, 1, 2, and so on."""
@@ -204,6 +206,36 @@ class Connector:
     solid: Solid
 
 
+@dataclass(frozen=True)
+class Finding:
+    """A dimension of a class's piece or of the connector (`subject`) against what the process needs, in `unit`.
+
+    `limit` says whether `available` must be at least or at most what is `needed`.
+    """
+
+    subject: str
+    what: str
+    needed: float
+    available: float
+    unit: Literal["mm", "degrees"]
+    limit: Literal["at least", "at most"]
+    remedy: str = ""
+
+    @property
+    def is_met(self) -> bool:
+        """Whether the process can make it as it is."""
+        slack = self.available - self.needed
+        return (slack if self.limit == "at least" else -slack) >= -FINDING_TOLERANCE
+
+    def __str__(self) -> str:
+        """In one sentence."""
+        unit = "°" if self.unit == "degrees" else " mm"
+        text = (
+            f"{self.subject}: {self.what} is {self.available:.2f}{unit}, {self.limit} {self.needed:.2f}{unit} is needed"
+        )
+        return text if self.is_met or not self.remedy else f"{text}; {self.remedy}"
+
+
 @dataclass(frozen=True, eq=False)
 class PartSet:
     """The printed shapes of a kit and how the faces use them.
@@ -220,6 +252,7 @@ class PartSet:
     face_turn: Ints
     groove_mm: Floats
     notes: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

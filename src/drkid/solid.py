@@ -12,6 +12,8 @@ from drkid.mesh import Floats, TriMesh
 
 CIRCLE_SEGMENTS = 48  # facets of a round shape: less than 0.01 mm off the circle at hinge radii
 
+SLIVER = 1e-3  # corners of outlines that stand out by less are dropped: they are rounding, and make needles of faces
+
 
 def circle_outside(radius: float) -> Floats:
     """(CIRCLE_SEGMENTS, 2): the regular polygon whose sides, four of them along the axes, touch a circle outside."""
@@ -44,6 +46,13 @@ class Solid:
         points = np.asarray(profile, np.float64)
         ends = [np.column_stack([np.full(len(points), x), points]) for x in (low, high)]
         return cls.hull(np.vstack(ends))
+
+    @classmethod
+    def prism_along_z(cls, outlines: Iterable[ArrayLike], low: float, high: float) -> Self:
+        """The prism from z = `low` to z = `high` over the union of the convex hulls of point sets (n, 2) in (x, y)."""
+        hulls = [manifold3d.CrossSection.hull_points(np.asarray(o, np.float64)) for o in outlines]
+        union = manifold3d.CrossSection.batch_boolean(hulls, manifold3d.OpType.Add).simplify(SLIVER)
+        return cls(manifold3d.Manifold.extrude(union, high - low).translate((0.0, 0.0, low)))
 
     @classmethod
     def hull(cls, points: ArrayLike) -> Self:

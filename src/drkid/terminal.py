@@ -89,6 +89,9 @@ def show_kit(kit: "Kit", folder: "Path", seconds: float) -> None:
     console, metrics = _out(), kit.metrics
     for note in kit.notes:
         console.print(f"[yellow]note:[/] {_plain(note)}", soft_wrap=True)
+    for finding in kit.part_set.findings:
+        if not finding.is_met:
+            console.print(f"[bold red]warning:[/] {_plain(str(finding))}", soft_wrap=True)
     size = " × ".join(f"{x:.0f}" for x in kit.decomposition.mesh.extents)
     distance, outcome = metrics.surface_assembled, kit.decomposition.outcome
     rows = {

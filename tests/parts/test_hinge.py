@@ -20,7 +20,7 @@ def about_x(degrees: float) -> np.ndarray:
 @pytest.mark.parametrize("bend", [0, 60, 109, 135])
 def test_half_mates_with_itself_turned_round(process, knuckles, bend) -> None:
     d = proposed(KitSpec(process=process, knuckles=knuckles), bend + 5.5)
-    half = hinge_half(d, bend + 5.5).solid
+    half = hinge_half(d).solid
     for degrees in (bend - 5, bend, bend + 5, -bend - 5):
         other = half.moved(about_x(degrees) @ TURNED_ROUND)
         assert (half & other).volume < 1e-9
@@ -30,7 +30,7 @@ def test_half_mates_with_itself_turned_round(process, knuckles, bend) -> None:
 @pytest.mark.parametrize("process", PROCESSES)
 def test_bore_wall_and_outline_are_as_stated(process) -> None:
     d = proposed(KitSpec(process=process), 60.0)
-    half = hinge_half(d, 60.0).solid
+    half = hinge_half(d).solid
     bore = d.rod_diameter_mm / 2 + d.rod_clearance_mm
     rod = Solid.cylinder_along_x(d.rod_diameter_mm / 2, -30, 30)
     assert half.gap(rod, 1.0) == pytest.approx(d.rod_clearance_mm, abs=0.01)
@@ -38,16 +38,15 @@ def test_bore_wall_and_outline_are_as_stated(process) -> None:
     assert bore + d.knuckle_wall_mm == pytest.approx(d.barrel_diameter_mm / 2)
     assert (half - barrel).bounds[0, 1] > 0
     x, reach = half_width_mm(d), reach_mm(d)
-    assert half.bounds == pytest.approx(
-        np.array([[-x, -d.barrel_diameter_mm / 2, -d.barrel_diameter_mm / 2], [x, reach, d.barrel_diameter_mm / 2]])
-    )
+    radius, wide = d.barrel_diameter_mm / 2, x + d.detent_mm
+    assert half.bounds == pytest.approx(np.array([[-wide, -radius, -radius], [wide, reach, radius]]))
     assert half.mesh().is_closed_manifold
     assert half.mesh().component_count == 1
 
 
 def test_both_halves_fill_every_knuckle_place_once() -> None:
     d = proposed(KitSpec(knuckles=4), 40.0)
-    half = hinge_half(d, 40.0).solid
+    half = hinge_half(d).solid
     probe = Solid.box((-50, -1, -5), (50, 1, 5))
     pitch = d.knuckle_length_mm + d.knuckle_gap_mm
     both = (half + half.moved(TURNED_ROUND)) & probe

@@ -70,7 +70,7 @@ def test_all_pockets_hold_the_connector_alike_with_the_clearance(kit) -> None:
 
 
 def test_left_is_the_mirror_image_of_right() -> None:
-    right, left = made(sixths()).parts
+    right, left = made(sixths(), marks=False).parts
     assert (right.handedness, left.handedness) == ("right", "left")
     mirrored = right.solid.moved(np.diag([-1.0, 1, 1, 1]))
     assert (mirrored & left.solid).volume == pytest.approx(left.solid.volume)
@@ -79,7 +79,7 @@ def test_left_is_the_mirror_image_of_right() -> None:
 
 @pytest.mark.parametrize("thickening", ["bisector", "mean_normal", "perpendicular"])
 def test_symmetric_pieces_are_their_own_mirror_image(thickening) -> None:
-    for part in made(geodesic(), thickening=thickening).parts:
+    for part in made(geodesic(), thickening=thickening, marks=False).parts:
         assert part.handedness == "any"
         lengths = side_lengths(part.corners)
         odd = int(np.argmax(np.abs(lengths - np.median(lengths))))  # the base of the isosceles piece
@@ -100,14 +100,17 @@ def test_a_kit_without_left_faces_has_no_left_part() -> None:
 
 
 @pytest.mark.parametrize("process", PROCESSES)
-@pytest.mark.parametrize("connector", ["hinge", "box", "none"])
+@pytest.mark.parametrize("connector", ["hinge", "snap", "box", "none"])
 def test_every_process_and_connector_makes_a_kit_that_fits(process, connector) -> None:
     parts = made(geodesic(), process=process, connector=connector)
     size = parts.scale_mm_per_unit * geodesic().extents.max()
     assert size == pytest.approx(round(size))
-    assert [c.name for c in parts.connectors] == {"hinge": ["connector_half"], "box": ["connector_key"], "none": []}[
-        connector
-    ]
+    assert [c.name for c in parts.connectors] == {
+        "hinge": ["connector_half"],
+        "snap": ["connector_snap"],
+        "box": ["connector_key"],
+        "none": [],
+    }[connector]
     assert all(p.solid.mesh().is_closed_manifold for p in parts.parts)
     if connector != "none":
         with pytest.raises(FitError):
@@ -226,10 +229,10 @@ def test_notes_tell_how_pockets_are_used() -> None:
     assert made(icosahedron(), connector="none").notes == ()
 
 
-def test_notes_tell_the_bend_that_a_key_does_not_follow() -> None:
-    note = made(icosahedron(), connector="box").notes[1]
-    assert "30 joints bend more" in note
-    assert "41.8°" in note
+def test_notes_tell_that_keys_are_glued() -> None:
+    note = made(icosahedron(), connector="box").notes[0]
+    assert "glued" in note
+    assert "0 joints bend more" in note
 
 
 def test_notes_count_the_joints_that_touch() -> None:
@@ -256,8 +259,32 @@ def test_notes_tell_of_joints_sharper_than_any_hinge() -> None:
     assert f"{sharp} joints bend by more than 134.5°" in text
 
 
-def test_notes_warn_of_walls_too_thick_to_mould() -> None:
-    assert "core them out" in made(icosahedron(), process="injection").notes[-1]
+def test_findings_name_what_a_process_cannot_make() -> None:
+    parts = made(icosahedron(), process="injection")
+    failed = {f.what: f for f in parts.findings if not f.is_met}
+    assert failed["thickness"].needed == 3.5
+    assert failed["thickness"].available == parts.dimensions.thickness_mm
+    assert "core them out" in str(failed["thickness"])
+    walls = [f for f in parts.findings if f.what == "wall between two pockets"]
+    assert walls
+    assert all(f.is_met and f.subject == "class A" for f in walls)
+    assert all(f.is_met for f in made(icosahedron()).findings)
+
+
+def test_a_mean_edge_sets_the_scale() -> None:
+    mesh = geodesic()
+    parts = made(mesh, mean_edge_mm=60)
+    assert parts.scale_mm_per_unit * mesh.mean_edge == pytest.approx(60)
+    assert parts.dimensions.knuckles > 2
+    assert made(mesh, fit=True).scale_mm_per_unit == made(mesh).scale_mm_per_unit
+
+
+def test_marks_take_material_and_change_no_mould() -> None:
+    plain, engraved = (made(sixths(), marks=on) for on in (False, True))
+    assert len(plain.parts) == len(engraved.parts)
+    for a, b in zip(plain.parts, engraved.parts, strict=True):
+        assert b.solid.volume < a.solid.volume
+        assert (b.solid - a.solid).volume < 1e-6
 
 
 def test_progress_runs_from_nothing_to_all() -> None:

@@ -3,7 +3,7 @@ import pytest
 
 from drkid.parts.class_triangle import laid_down
 from drkid.parts.dimensions import proposed
-from drkid.parts.pocket import pocket, side_frames
+from drkid.parts.pocket import flare_mm, pocket, side_frames
 from drkid.spec import KitSpec
 
 
@@ -22,9 +22,20 @@ def test_side_frames_are_proper_motions_onto_the_sides() -> None:
 
 
 def test_pocket_is_open_inwards_and_outwards_and_closed_elsewhere() -> None:
-    d = proposed(KitSpec(), 40.0)
+    d = proposed(KitSpec(retention="glue"), 40.0)
     low, high = pocket(d).bounds
     assert high == pytest.approx([d.pocket_width_mm / 2, d.pocket_depth_mm, d.pocket_height_mm / 2])
     assert low[0] == -high[0]
     assert low[2] < -d.thickness_mm / 2
     assert low[1] < -d.thickness_mm
+
+
+def test_drafted_pocket_widens_from_its_roof_to_the_inner_face() -> None:
+    d = proposed(KitSpec(process="injection", retention="glue"), 40.0)
+    space = pocket(d)
+    widths = [np.ptp(space.cross_section(z)[0][:, 0]) for z in (d.pocket_height_mm / 2 - 1e-6, -d.thickness_mm / 2)]
+    assert widths[0] == pytest.approx(d.pocket_width_mm, abs=1e-5)
+    assert widths[1] == pytest.approx(d.pocket_width_mm + 2 * flare_mm(d, -d.thickness_mm / 2))
+    assert flare_mm(d, -d.thickness_mm / 2) == pytest.approx(
+        (d.pocket_height_mm + d.thickness_mm) / 2 * 0.017455, rel=1e-3
+    )

@@ -230,6 +230,18 @@ class MetricsDocument(Model):
     assembly: AssemblyDocument | None = None
 
 
+class FindingDocument(Model):
+    """A dimension against what the process needs."""
+
+    subject: str = Field(description="class A, connector, …")
+    what: str
+    needed: float
+    available: float
+    unit: Literal["mm", "degrees"]
+    limit: Literal["at least", "at most"]
+    remedy: str = ""
+
+
 class ConvergenceDocument(Model):
     """A recorded iteration of the solver."""
 
@@ -267,3 +279,4 @@ class KitDocument(Model):
     convergence: list[ConvergenceDocument]
     outcome: OutcomeDocument
     notes: list[str] = Field(default=[], description="what a user should know about this kit")
+    findings: list[FindingDocument] = Field(default=[], description="dimensions against what the process needs")

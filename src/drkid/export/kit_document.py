@@ -59,6 +59,7 @@ def kit_document(kit: Kit) -> doc.KitDocument:
         convergence=_convergence(kit),
         outcome=doc.OutcomeDocument(**asdict(kit.decomposition.outcome)),
         notes=list(kit.notes),
+        findings=[doc.FindingDocument(**asdict(finding)) for finding in kit.part_set.findings],
     )
 
 

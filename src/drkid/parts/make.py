@@ -16,10 +16,12 @@ from drkid.parts.fit import FITS_MM, Margin, margins, smallest_scale
 from drkid.parts.groove import groove_mm, recesses
 from drkid.parts.hinge import hinge_half
 from drkid.parts.key import box_key
+from drkid.parts.marks import marked
 from drkid.parts.members import Members, members_of
 from drkid.parts.notes import notes
 from drkid.parts.pocket import pocket, side_frames
 from drkid.parts.prismoid import Prismoid
+from drkid.parts.process_findings import findings
 from drkid.parts.snap import snap_half
 from drkid.parts.thickening import thickened
 from drkid.progress import Progress, silent
@@ -38,7 +40,7 @@ def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress =
     One piece a class where it is its own mirror image, a left and a right one where it is not and both are used.
     The scale is the decomposition's own where given edge lengths fix it. Else it makes the longest side of the mesh's
     bounding box `spec.size_mm`, or is the smallest at which all pockets and walls fit, rounded up to whole mm of that
-    side. Marks are engraved later.
+    side. The inner face of each is marked.
 
     Raises:
         FitError: pockets and walls do not fit at the asked size or thickness, or a piece is larger than the bed.
@@ -53,6 +55,7 @@ def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress =
     progress("cutting parts", 0.5)
     shapes = design.pieces(scale)
     parts, face_part = _parts(design, shapes, scale)
+    parts, unmarked = _marked(parts, design)
     for part in parts:
         _require_bed(part, spec)
     insets = np.stack([s.insets(t) for s, t in zip(shapes, design.triangles(scale), strict=True)])
@@ -66,7 +69,10 @@ def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress =
         face_part=face_part,
         face_turn=members.turn,
         groove_mm=read_only(groove_mm(decomposition.mesh, members, recess)),
-        notes=notes(decomposition, members, design.dimensions, spec, recess, scale),
+        findings=findings(
+            design.triangles(scale), shapes, np.unique(members.face_class).tolist(), design.dimensions, spec
+        ),
+        notes=(*notes(decomposition, members, design.dimensions, spec, recess, scale), *unmarked),
     )
 
 
@@ -209,6 +215,22 @@ def _mirrored(right: Part, dimensions: Dimensions) -> Part:
     triangle = (right.corners[:, :2] * [-1, 1])[list(LEFT_CORNERS)]
     frames = side_frames(triangle, dimensions.key_bend_degrees / 2)
     return Part(right.class_index, "left", _flat(triangle), frames, right.solid.moved(MIRROR))
+
+
+def _marked(parts: tuple[Part, ...], design: _Design) -> tuple[tuple[Part, ...], tuple[str, ...]]:
+    """The parts with their marks, and a note for each that has no room for one."""
+    spec, notes_ = design.spec, list[str]()
+    depth = spec.preset.mark_depth_mm if spec.mark_depth_mm is None else spec.mark_depth_mm
+    if not spec.marks or depth == 0:
+        return parts, ()
+    made: list[Part] = []
+    for part in parts:
+        found, missing = marked(part, design.dimensions, spec.preset.engrave_width_mm, depth)
+        made.append(found)
+        hand = "" if part.handedness == "any" else f" ({part.handedness})"
+        if missing:
+            notes_.append(f"Class {class_id(part.class_index)}{hand}: no room for the {', '.join(missing)} inside.")
+    return tuple(made), tuple(notes_)
 
 
 def _flat(triangle: Floats) -> Floats:

@@ -29,7 +29,7 @@ def notes(
         *_touching_notes(touching, spec),
         *_short_notes(members, dimensions, spec, recess_mm, scale),
         *_bevel_notes(members, spec),
-        *_limit_notes(members, dimensions, spec),
+        *_limit_notes(members, spec),
     )
 
 
@@ -96,16 +96,10 @@ def _bevel_notes(members: Members, spec: KitSpec) -> Iterator[str]:
         )
 
 
-def _limit_notes(members: Members, dimensions: Dimensions, spec: KitSpec) -> Iterator[str]:
+def _limit_notes(members: Members, spec: KitSpec) -> Iterator[str]:
     sharp = np.degrees(np.abs(members.bend_radians)) + spec.swing_degrees > SHARPEST_JOINT_DEGREES
     if sharp.any():
         yield (
             f"{int(sharp.sum()) // 2} joints bend by more than {SHARPEST_JOINT_DEGREES - spec.swing_degrees:g}°: "
             "what they join touches."
-        )
-    thickest = spec.preset.max_wall_mm
-    if thickest is not None and dimensions.thickness_mm > thickest:
-        yield (
-            f"Pieces are {dimensions.thickness_mm:g} mm thick; {spec.process} moulding wants walls of {thickest:g} mm "
-            "at most: core them out from the inner face."
         )

@@ -1,0 +1,101 @@
+"""What the process needs of every piece and connector, beside what they have: walls, draft, undercuts, overhangs."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from drkid.kit import Dimensions, Finding, class_id
+from drkid.mesh import Floats
+from drkid.parts.fit import margins
+from drkid.parts.prismoid import Prismoid
+from drkid.spec import KitSpec
+
+
+def findings(
+    triangles: Floats, pieces: tuple[Prismoid, ...], used: list[int], dimensions: Dimensions, spec: KitSpec
+) -> tuple[Finding, ...]:
+    """Every finding, class by class, then the connector's; triangles (k, 3, 2), `used` the classes that have pieces.
+
+    Pieces are printed on their outer face, pockets and marks upwards, so that nothing but the lean of a side hangs
+    over; moulds open along the piece's normal.
+    """
+    found: list[Finding] = []
+    for k in used:
+        subject = f"class {class_id(k)}"
+        found += _walls(subject, triangles[k], pieces[k], dimensions)
+        found += _sides(subject, triangles[k], pieces[k], spec)
+    return (*found, *_process(dimensions, spec))
+
+
+def _walls(subject: str, triangle: Floats, piece: Prismoid, dimensions: Dimensions) -> Iterator[Finding]:
+    """The tightest of each kind of length that must not fall short."""
+    tightest: dict[str, Finding] = {}
+    for m in margins(triangle, piece, dimensions):
+        if m.what not in tightest or m.available_mm < tightest[m.what].available:
+            tightest[m.what] = Finding(
+                subject, m.what, m.needed_mm, m.available_mm, "mm", "at least", "make the print larger"
+            )
+    yield from tightest.values()
+
+
+def _sides(subject: str, triangle: Floats, piece: Prismoid, spec: KitSpec) -> Iterator[Finding]:
+    """Draft of the sides in a mould, and their lean outwards from the outer face on, on which a piece is printed."""
+    inner, outer = piece.insets(triangle)
+    lean = np.degrees(np.arctan((outer - inner) / piece.thickness_mm))
+    preset = spec.preset
+    if preset.draft_degrees:
+        side = int(np.abs(lean).argmin())
+        yield Finding(
+            subject,
+            f"draft of side {side + 1}",
+            preset.draft_degrees,
+            float(abs(lean[side])),
+            "degrees",
+            "at least",
+            "its walls are upright in the mould: draft them there, or take another --seed",
+        )
+    if preset.overhang_degrees < UPRIGHT_DEGREES:
+        side = int(lean.argmax())
+        yield Finding(
+            subject,
+            f"overhang of side {side + 1}, outer face down",
+            preset.overhang_degrees,
+            max(float(lean[side]), 0.0),
+            "degrees",
+            "at most",
+            "print it with supports, or inner face down",
+        )
+
+
+def _process(d: Dimensions, spec: KitSpec) -> Iterator[Finding]:
+    preset = spec.preset
+    if preset.max_wall_mm is not None:
+        yield Finding(
+            "all pieces",
+            "thickness",
+            preset.max_wall_mm,
+            d.thickness_mm,
+            "mm",
+            "at most",
+            "core them out from the inner face",
+        )
+    if preset.max_undercut_mm is not None and d.detent_mm:
+        remedy = "hold the hinges with --retention glue"
+        for subject, what in (("all pieces", "undercut of the detent's grooves"), ("connector", "height of its bumps")):
+            yield Finding(subject, what, preset.max_undercut_mm, d.detent_mm, "mm", "at most", remedy)
+    if d.rod_diameter_mm:
+        bore = d.rod_diameter_mm + 2 * d.rod_clearance_mm
+        yield Finding("connector", "bore", preset.min_hole_mm, bore, "mm", "at least", "a thicker --rod-diameter-mm")
+    if d.connector in {"hinge", "snap"}:
+        yield Finding("connector", "gap between knuckles", preset.knuckle_gap_mm, d.knuckle_gap_mm, "mm", "at least")
+    if spec.marks and (depth := _mark_depth(spec)):
+        yield Finding(
+            "marks", "depth", d.thickness_mm - d.min_wall_mm, depth, "mm", "at most", "a lesser --mark-depth-mm"
+        )
+
+
+def _mark_depth(spec: KitSpec) -> float:
+    return spec.preset.mark_depth_mm if spec.mark_depth_mm is None else spec.mark_depth_mm
+
+
+UPRIGHT_DEGREES = 90.0  # a process that prints any overhang
