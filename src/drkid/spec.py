@@ -26,6 +26,7 @@ UNIVERSAL = (32.0, 37.5)
 UNIVERSAL_BEVEL = (60.0, 90.0)
 """Concave and convex bends in degrees that pieces of given lengths are bevelled for: they then fit any shape."""
 
+FOLLOWING = ("bisector", "flippable")  # thickenings whose bevels follow the bends of the surface
 LEAST_RATIO, MOST_RATIO = 1.03, 1.6  # of given lengths: nearer ones are one length to a hand, others make slivers
 MOST_CLASSES = {2: 4, 3: 10}  # of a palette of two or three lengths
 MULTISETS = {1: "ssl", 2: "ssl,sll", 3: "sss,ssl,sll", 4: "sss,ssl,sll,lll"}  # of two lengths, by number of classes
@@ -216,7 +217,10 @@ class KitSpec(BaseModel):
     )
     thickness_mm: float | None = _field(None, "Pieces", "Thickness of the pieces.", gt=0)
     thickening: Thickening = _field(
-        "bisector", "Pieces", "How the sides are bevelled: bisector cannot collide, mean_normal is the paper's."
+        "bisector",
+        "Pieces",
+        "How the sides are bevelled: bisector cannot collide; flippable cannot either and is the same from both faces; "
+        "mean_normal is the paper's; perpendicular is not at all.",
     )
     connector: ConnectorKind = _field("hinge", "Pieces", "What joins two pieces: hinge (with a rod), box key, none.")
     clearance_mm: float | None = _field(None, "Pieces", "Gap between connector and pocket.", ge=0)
@@ -236,6 +240,14 @@ class KitSpec(BaseModel):
         f"when not given, {', '.join(f'{x:g}' for x in UNIVERSAL_BEVEL)} where lengths are.",
     )
     bed_mm: Triple = _field((220.0, 220.0, 250.0), "Pieces", "Build volume X,Y,Z of the printer.")
+    bevel_variants: int = _field(
+        1,
+        "Pieces",
+        "Moulds that a class is split into by the angles at which its pieces meet: more of them, narrower grooves. "
+        "The kit's notes say what each further one buys.",
+        ge=1,
+        le=20,
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -341,6 +353,11 @@ def _contradiction(spec: KitSpec) -> str:
         return f"like and {other} are both given: the kit that is named has both lengths and triangles"
     if spec.bevel_degrees is not None and spec.thickening != "bisector":
         return f"bevel_degrees is given and thickening is {spec.thickening}: only bisector follows bends"
+    if spec.bevel_variants > 1 and (spec.bevel_degrees is not None or spec.thickening not in FOLLOWING):
+        rule = "bevel_degrees is given" if spec.bevel_degrees is not None else f"thickening is {spec.thickening}"
+        return (
+            f"bevel_variants is {spec.bevel_variants} and {rule}: pieces of a class then have one bevel, whatever meets"
+        )
     return _palette_contradiction(spec)
 
 

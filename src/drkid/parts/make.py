@@ -9,14 +9,16 @@ import numpy as np
 from drkid.errors import FitError
 from drkid.kit import Connector, Decomposition, Dimensions, Part, PartSet, class_id
 from drkid.mesh import Floats, Ints, read_only
+from drkid.parts.bevel_variants import Moulds, moulds
 from drkid.parts.class_triangle import LEFT_CORNERS, is_mirror_symmetric, laid_down, printed_lengths
 from drkid.parts.dimensions import proposed
 from drkid.parts.fit import FITS_MM, Margin, margins, smallest_scale
-from drkid.parts.groove import groove_mm, recesses
+from drkid.parts.groove import groove_mm
+from drkid.parts.groove_choices import groove_choices, recesses_of
 from drkid.parts.hinge import hinge_half
 from drkid.parts.key import box_key
-from drkid.parts.members import Members, members_of
-from drkid.parts.notes import notes
+from drkid.parts.members import Members
+from drkid.parts.notes import groove_notes, notes
 from drkid.parts.pocket import pocket, side_frames
 from drkid.parts.prismoid import Prismoid
 from drkid.parts.thickening import thickened
@@ -31,7 +33,8 @@ WHOLE_MM = 1e-6
 def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress = silent) -> PartSet:
     """The printed shapes of a kit: pieces with bevels and pockets, connectors, and which face uses which.
 
-    One piece a class where it is its own mirror image, a left and a right one where it is not and both are used.
+    One piece a class where it is its own mirror image, a left and a right one where it is not and both are used;
+    `spec.bevel_variants` of each. An equilateral piece is laid down in the way that narrows its bevels.
     The scale is the decomposition's own where given edge lengths fix it. Else it makes the longest side of the mesh's
     bounding box `spec.size_mm`, or is the smallest at which all pockets and walls fit, rounded up to whole mm of that
     side. Marks are engraved later.
@@ -40,10 +43,11 @@ def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress =
         FitError: pockets and walls do not fit at the asked size or thickness, or a piece is larger than the bed.
     """
     progress("laying pieces on faces", 0.0)
-    members = members_of(decomposition)
+    found = moulds(decomposition, spec, spec.bevel_variants)
+    members = found.members
     bends = spec.bevel_degrees or (degrees(float(np.abs(members.bend_radians).max())),)
     sharpest = max(bends) + spec.swing_degrees
-    design = _Design(decomposition, members, proposed(spec, sharpest), spec)
+    design = _Design(found, proposed(spec, sharpest), spec)
     progress("finding the size", 0.2)
     scale = _scale(design)
     progress("cutting parts", 0.5)
@@ -51,8 +55,9 @@ def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress =
     parts, face_part = _parts(design, shapes, scale)
     for part in parts:
         _require_bed(part, spec)
-    insets = np.stack([s.insets(t) for s, t in zip(shapes, design.triangles(scale), strict=True)])
-    recess = recesses(members, insets, scale, design.dimensions.thickness_mm)
+    recess = recesses_of(found, design.dimensions, spec, scale)
+    width = groove_mm(decomposition.mesh, members, recess)
+    choices = groove_choices(decomposition, design.dimensions, spec, scale)
     progress("cutting parts", 1.0)
     return PartSet(
         scale_mm_per_unit=scale,
@@ -61,8 +66,9 @@ def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress =
         connectors=_connectors(design.dimensions, sharpest),
         face_part=face_part,
         face_turn=members.turn,
-        groove_mm=read_only(groove_mm(decomposition.mesh, members, recess)),
-        notes=notes(decomposition, members, design.dimensions, spec, recess, scale),
+        groove_mm=read_only(width),
+        notes=(*notes(found, design.dimensions, spec, recess, scale), *groove_notes(width, choices, spec)),
+        groove_choices=choices,
     )
 
 
@@ -70,10 +76,17 @@ def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress =
 class _Design:
     """All but the scale."""
 
-    decomposition: Decomposition
-    members: Members
+    moulds: Moulds
     dimensions: Dimensions
     spec: KitSpec
+
+    @property
+    def decomposition(self) -> Decomposition:
+        return self.moulds.decomposition
+
+    @property
+    def members(self) -> Members:
+        return self.moulds.members
 
     @property
     def longest(self) -> float:
@@ -87,7 +100,7 @@ class _Design:
         return thickened(self.decomposition.class_lengths, self.members, self.dimensions, self.spec, scale)
 
     def tightest(self, scale: float) -> tuple[int, Margin]:
-        """The class with the least slack of those in use, and where."""
+        """The mould with the least slack of those in use, and where."""
         used = np.unique(self.members.face_class)
         triangles, pieces = self.triangles(scale), self.pieces(scale)
         found = [(int(k), m) for k in used for m in margins(triangles[k], pieces[k], self.dimensions)]
@@ -117,9 +130,10 @@ def _scale(design: _Design) -> float:
         return design.smallest_size_mm() / design.longest
     index, margin = design.tightest(size / design.longest)
     if margin.slack_mm < FITS_MM:
-        sides = ", ".join(f"{x:.1f}" for x in design.decomposition.class_lengths[index] * size / design.longest)
+        name, lengths = design.moulds.name(index), design.decomposition.class_lengths[index] * size / design.longest
+        sides = ", ".join(f"{x:.1f}" for x in lengths)
         raise FitError(
-            f"the {margin.what} of class {class_id(index)} (sides {sides} mm) does not fit at size_mm {size:g}",
+            f"the {margin.what} of class {name} (sides {sides} mm) does not fit at size_mm {size:g}",
             wanted=f"{margin.needed_mm:.2f} mm",
             found=f"{margin.available_mm:.2f} mm",
             remedy=f"a larger print (--size-mm {design.smallest_size_mm()} or more), fewer pieces (--faces), "
@@ -138,7 +152,7 @@ def _required_scale(design: _Design, scale: float) -> float:
     lengths = np.unique(np.round(design.decomposition.class_lengths * scale, 6))
     longer = ",".join(f"{ceil(10 * factor * x) / 10:g}" for x in lengths)
     raise FitError(
-        f"the {margin.what} of class {class_id(index)} does not fit at the given lengths (sides {sides} mm)",
+        f"the {margin.what} of class {design.moulds.name(index)} does not fit at the given lengths (sides {sides} mm)",
         wanted=f"{margin.needed_mm:.2f} mm",
         found=f"{margin.available_mm:.2f} mm",
         remedy=f"lengths {factor:.2f} times as long (--palette {longer}), a thinner rod (--rod-diameter-mm), "
@@ -147,7 +161,7 @@ def _required_scale(design: _Design, scale: float) -> float:
 
 
 def _parts(design: _Design, shapes: tuple[Prismoid, ...], scale: float) -> tuple[tuple[Part, ...], Ints]:
-    """The parts in use, by class, right before left, and which one each face is made from."""
+    """The parts in use, by class and bevel variant, right before left, and which one each face is made from."""
     members, parts = design.members, list[Part]()
     face_part = np.empty(len(members.face_class), np.int64)
     for index, triangle in enumerate(design.triangles(scale)):
@@ -166,13 +180,15 @@ def _right_part(design: _Design, index: int, triangle: Floats, shape: Prismoid) 
     if design.dimensions.connector != "none":
         solid = solid.minus_all([pocket(design.dimensions).moved(frame) for frame in frames])
     symmetric = is_mirror_symmetric(design.decomposition.class_lengths[index])
-    return Part(index, "any" if symmetric else "right", _flat(triangle), frames, solid)
+    own, variant = int(design.moulds.class_index[index]), int(design.moulds.variant[index])
+    return Part(own, "any" if symmetric else "right", _flat(triangle), frames, solid, variant)
 
 
 def _mirrored(right: Part) -> Part:
     """The left part of a class: the mirror image of the right one, first side along x again."""
     triangle = (right.corners[:, :2] * [-1, 1])[list(LEFT_CORNERS)]
-    return Part(right.class_index, "left", _flat(triangle), side_frames(triangle), right.solid.moved(MIRROR))
+    mirrored = right.solid.moved(MIRROR)
+    return Part(right.class_index, "left", _flat(triangle), side_frames(triangle), mirrored, right.variant)
 
 
 def _flat(triangle: Floats) -> Floats:
