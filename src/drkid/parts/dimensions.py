@@ -126,8 +126,9 @@ def _core(
         return _Core(height / 2, max(KEY_GRIP_HEIGHTS * height, LEAST_GRIP_MM))
     radius = barrel_mm / 2
     sharp = grip_start_mm(radius, spec.preset.knuckle_gap_mm, sharpest_degrees) + knuckle_wall_mm
-    roof = radius + _given(spec.clearance_mm, spec.preset.clearance_mm) + wall_mm / 2  # see held_height_mm
-    held = roof * _half_tangent(sharpest_degrees) + HOLD_SHARE * max(barrel_mm, LEAST_GRIP_MM)
+    clearance = _given(spec.clearance_mm, spec.preset.clearance_mm)
+    height = radius + clearance + wall_mm / 2  # held_height_mm, and below deepest_bevel_mm from the other side
+    held = clearance / 2 + height * _half_tangent(sharpest_degrees) + HOLD_SHARE * max(barrel_mm, LEAST_GRIP_MM)
     return _Core(radius, max(radius + max(barrel_mm, LEAST_GRIP_MM), sharp, held))
 
 

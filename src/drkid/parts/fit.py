@@ -45,14 +45,14 @@ def margins(triangle: Floats, prismoid: Prismoid, dimensions: Dimensions) -> Ite
     if dimensions.connector == "none":
         return
     wall = dimensions.min_wall_mm
-    roof = dimensions.pocket_height_mm / 2
+    roof, bevels = dimensions.pocket_height_mm / 2, list(prismoid.bevels(triangle))
     for height in (*prismoid.levels_mm[prismoid.levels_mm < roof].tolist(), roof):
         outline = prismoid.outline(height)
         pockets = pocket_outlines(triangle, outline, dimensions)
         between = min(convex_distance(pockets[i], pockets[i - 1]) for i in range(3))
         yield Margin("wall between two pockets", wall, between)
         across = _bevel_distance(pockets, outline)
-        for bottom, top, slope in prismoid.bevels(triangle):
+        for bottom, top, slope in bevels:
             if bottom <= height <= top:
                 distance = _nearest(across, slope, height - bottom, top - height)
                 yield Margin("wall between pocket and bevel", wall, distance)

@@ -9,6 +9,7 @@ import numpy as np
 from drkid.errors import FitError
 from drkid.kit import Connector, Decomposition, Dimensions, Part, PartSet, class_id
 from drkid.mesh import Floats, Ints, read_only
+from drkid.parts.bevel import require_bends
 from drkid.parts.bevel_variants import Moulds, moulds
 from drkid.parts.class_triangle import LEFT_CORNERS, is_mirror_symmetric, laid_down, printed_lengths
 from drkid.parts.dimensions import proposed
@@ -40,7 +41,8 @@ def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress =
     side. Marks are engraved later.
 
     Raises:
-        FitError: pockets and walls do not fit at the asked size or thickness, or a piece is larger than the bed.
+        FitError: pockets and walls do not fit at the asked size or thickness, a piece is larger than the bed, or a
+            joint bends beyond `spec.bevel_degrees`.
     """
     progress("laying pieces on faces", 0.0)
     found = moulds(decomposition, spec, spec.bevel_variants)
@@ -50,6 +52,7 @@ def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress =
     design = _Design(found, proposed(spec, sharpest), spec)
     progress("finding the size", 0.2)
     scale = _scale(design)
+    require_bends(decomposition.mesh.scaled(scale), spec)
     progress("cutting parts", 0.5)
     shapes = design.pieces(scale)
     parts, face_part = _parts(design, shapes, scale)

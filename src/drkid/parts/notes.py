@@ -24,7 +24,6 @@ def notes(moulds: Moulds, dimensions: Dimensions, spec: KitSpec, recess_mm: Floa
         *_connector_notes(members, dimensions),
         *_touching_notes(touching, spec),
         *_short_notes(moulds, dimensions, spec, recess_mm, scale),
-        *_bevel_notes(members, spec),
         *_limit_notes(members, dimensions, spec),
     )
 
@@ -68,9 +67,13 @@ def groove_notes(groove_mm: Floats, choices: tuple[GrooveChoice, ...], spec: Kit
         for c in choices
         if c.bevel_variants > spec.bevel_variants
     )
-    own = next(c for c in choices if c.bevel_variants == min(spec.bevel_variants, len(choices)))
-    now = f"Grooves are {own.mean_mm:.1f} mm wide in the mean and {own.max_mm:.1f} mm at most with {own.moulds} moulds"
-    return (f"{now}; {steps}.",) if steps else (f"{now}.",)
+    if not steps:
+        return ()
+    own = choices[spec.bevel_variants - 1]
+    return (
+        f"Grooves are {own.mean_mm:.1f} mm wide in the mean and {own.max_mm:.1f} mm at most with {own.moulds} "
+        f"{'mould' if own.moulds == 1 else 'moulds'}; {steps}.",
+    )
 
 
 def _short_notes(
@@ -92,20 +95,6 @@ def _short_notes(
                 f"connector would have no hold; {int((own[:, side] > TOUCH_MM).sum())} sides lack up to "
                 f"{own[:, side].max():.2f} mm and touch or cannot swing by {spec.swing_degrees:g}°."
             )
-
-
-def _bevel_notes(members: Members, spec: KitSpec) -> Iterator[str]:
-    """Joints beyond the bends that pieces are bevelled for, whatever the shape."""
-    if spec.bevel_degrees is None:
-        return
-    concave, convex = spec.bevel_degrees
-    bend = np.degrees(members.bend_radians)
-    count = int(((bend < -concave) | (bend > convex)).sum()) // 2
-    if count:
-        yield (
-            f"{count} joints bend beyond the {concave:g}° concave or {convex:g}° convex that every piece is bevelled "
-            f"for, to {bend.min():.0f}° and {bend.max():.0f}° at most: what they join touches."
-        )
 
 
 def _limit_notes(members: Members, dimensions: Dimensions, spec: KitSpec) -> Iterator[str]:
