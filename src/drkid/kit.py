@@ -189,6 +189,7 @@ class Part:
     """A printed shape of a class, in the part frame of the kit format.
 
     `corners` (3, 3) counter-clockwise from outside, `side_frames` (3, 4, 4) from connector to part coordinates.
+    `variant` counts the bevels of a class from 1; 0 where it has one.
     """
 
     class_index: int
@@ -196,6 +197,22 @@ class Part:
     corners: Floats
     side_frames: Floats
     solid: Solid
+    variant: int = 0
+
+    @property
+    def name(self) -> str:
+        """As people read it: A, or A2 where class A has several bevels."""
+        return f"{class_id(self.class_index)}{self.variant or ''}"
+
+
+@dataclass(frozen=True)
+class GrooveChoice:
+    """What the grooves are if every class has at most so many bevel variants: moulds in all, widths in mm."""
+
+    bevel_variants: int
+    moulds: int
+    mean_mm: float
+    max_mm: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,7 +258,8 @@ class PartSet:
     """The printed shapes of a kit and how the faces use them.
 
     `scale_mm_per_unit` takes the decomposition's unit to mm. Face f is made from `parts[face_part[f]]`, whose
-    corner 0 lies at the face's corner `face_turn[f]`. `groove_mm` (E,) is each joint's widest visible gap.
+    corner 0 lies at the face's corner `face_turn[f]`. `groove_mm` (E,) is each joint's widest visible gap;
+    `groove_choices` is what bevels made for this shape alone, and further variants of them, would make of it.
     """
 
     scale_mm_per_unit: float
@@ -253,6 +271,7 @@ class PartSet:
     groove_mm: Floats
     notes: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
+    groove_choices: tuple[GrooveChoice, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -426,6 +445,8 @@ class Metrics:
     rigidity: Rigidity | None = None
     seconds: dict[str, float] = field(default_factory=dict)
     assembly: AssemblyFigures | None = None
+    unique_connector_parts: int = 0
+    groove_choices: tuple[GrooveChoice, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -48,4 +48,6 @@ def measure_kit(
         iterations=decomposition.iterations,
         rigidity=decomposition.rigidity,
         seconds=seconds,
+        unique_connector_parts=len(part_set.connectors),
+        groove_choices=part_set.groove_choices,
     )

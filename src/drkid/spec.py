@@ -23,9 +23,10 @@ EXACT_TOLERANCE, LARGE_TOLERANCE, PRESSURE_TOLERANCE = 0.1, 1.0, 1.5  # in perce
 UNIVERSAL = (32.0, 37.5)
 """Two edge lengths in mm of which every organic shape can be built: ratio 1.17, room for every process's connectors."""
 
-UNIVERSAL_BEVEL = (60.0, 90.0)
+UNIVERSAL_BEVEL = (92.0, 105.0)
 """Concave and convex bends in degrees that pieces of given lengths are bevelled for: they then fit any shape."""
 
+FOLLOWING = ("bisector", "flippable")  # thickenings whose bevels follow the bends of the surface
 LEAST_RATIO, MOST_RATIO = 1.03, 1.6  # of given lengths: nearer ones are one length to a hand, others make slivers
 MOST_CLASSES = {2: 4, 3: 10}  # of a palette of two or three lengths
 MULTISETS = {1: "ssl", 2: "ssl,sll", 3: "sss,ssl,sll", 4: "sss,ssl,sll,lll"}  # of two lengths, by number of classes
@@ -197,7 +198,10 @@ class KitSpec(BaseModel):
     )
     thickness_mm: float | None = _field(None, "Pieces", "Thickness of the pieces.", gt=0)
     thickening: Thickening = _field(
-        "bisector", "Pieces", "How the sides are bevelled: bisector cannot collide, mean_normal is the paper's."
+        "bisector",
+        "Pieces",
+        "How the sides are bevelled: bisector cannot collide; flippable cannot either and is the same from both faces; "
+        "mean_normal is the paper's; perpendicular is not at all.",
     )
     connector: ConnectorKind = _field(
         "hinge",
@@ -237,6 +241,14 @@ class KitSpec(BaseModel):
     marks: bool = _field(True, "Pieces", "Engrave class letter and side ticks on the inner face.")
     process_values: ProcessPreset | None = _field(
         None, "Pieces", "What the process can do where it is a user's own: written to kit.json, read from --process."
+    )
+    bevel_variants: int = _field(
+        1,
+        "Pieces",
+        "Moulds that a class is split into by the angles at which its pieces meet: more of them, narrower grooves. "
+        "The kit's notes say what each further one buys.",
+        ge=1,
+        le=20,
     )
 
     documents: bool = _field(
@@ -353,6 +365,11 @@ def _contradiction(spec: KitSpec) -> str:
         return f"like and {other} are both given: the kit that is named has both lengths and triangles"
     if spec.bevel_degrees is not None and spec.thickening != "bisector":
         return f"bevel_degrees is given and thickening is {spec.thickening}: only bisector follows bends"
+    if spec.bevel_variants > 1 and (spec.bevel_degrees is not None or spec.thickening not in FOLLOWING):
+        rule = "bevel_degrees is given" if spec.bevel_degrees is not None else f"thickening is {spec.thickening}"
+        return (
+            f"bevel_variants is {spec.bevel_variants} and {rule}: pieces of a class then have one bevel, whatever meets"
+        )
     return _palette_contradiction(spec)
 
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from drkid.inspection import Inspection
-    from drkid.kit import AssemblyFigures, Kit, Rigidity
+    from drkid.kit import AssemblyFigures, Kit, Metrics, Rigidity
     from drkid.verification import Verification
 
 MOST_ROWS = 30  # of labels or components that a table shows
@@ -95,7 +95,7 @@ def show_kit(kit: "Kit", folder: "Path", seconds: float) -> None:
     size = " × ".join(f"{x:.0f}" for x in kit.decomposition.mesh.extents)
     distance, outcome = metrics.surface_assembled, kit.decomposition.outcome
     rows = {
-        "pieces": f"{metrics.pieces} in {metrics.classes} classes, {metrics.unique_piece_parts} moulds",
+        "pieces": f"{metrics.pieces} in {metrics.classes} classes, {_moulds(metrics)}",
         "error": _error(metrics.error_max_percent, metrics.error_mean_percent),
         "d_H": f"{distance.mean_percent:.2g} % mean, {distance.max_percent:.2g} % max from the input, of its box",
         "size": f"{size} mm, edges {metrics.mean_edge:.1f} mm, {kit.part_set.dimensions.thickness_mm:g} mm thick",
@@ -107,6 +107,13 @@ def show_kit(kit: "Kit", folder: "Path", seconds: float) -> None:
         "kit": str(folder),
     }
     _show_rows(console, rows)
+
+
+def _moulds(metrics: "Metrics") -> str:
+    """How many printed shapes there are."""
+    connectors = metrics.unique_connector_parts
+    beside = f" and {connectors} of connectors" if connectors else ""
+    return f"{metrics.unique_piece_parts} moulds{beside}"
 
 
 def _rigidity(found: "Rigidity | None", mean_edge_mm: float) -> str:

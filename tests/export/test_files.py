@@ -86,6 +86,8 @@ def test_names_of_files():
     assert [class_id(i) for i in (0, 25, 26, 51, 52, 701, 702)] == ["A", "Z", "AA", "AZ", "BA", "ZZ", "AAA"]
     assert part_file(1, "any") == "parts/B.stl"
     assert part_file(1, "left") == "parts/B_left.stl"
+    assert part_file(0, "any", 2) == "parts/A2.stl"
+    assert part_file(0, "right", 1) == "parts/A1_right.stl"
     assert connector_file("connector_half") == "parts/connector_half.stl"
     assert plate_file(3) == "plates/plate_03.3mf"
 

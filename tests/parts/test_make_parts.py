@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drkid.errors import FitError
+from drkid.export.stl import rounded, stl_bytes
 from drkid.kit import Decomposition, PartSet
 from drkid.measure import bend_radians
 from drkid.mesh import TriMesh
@@ -77,7 +78,7 @@ def test_left_is_the_mirror_image_of_right() -> None:
     assert left.solid.volume == pytest.approx(right.solid.volume)
 
 
-@pytest.mark.parametrize("thickening", ["bisector", "mean_normal", "perpendicular"])
+@pytest.mark.parametrize("thickening", ["bisector", "flippable", "mean_normal", "perpendicular"])
 def test_symmetric_pieces_are_their_own_mirror_image(thickening) -> None:
     for part in made(geodesic(), thickening=thickening, marks=False).parts:
         assert part.handedness == "any"
@@ -175,24 +176,70 @@ def test_lengths_too_short_for_the_connector_are_refused_with_those_that_do() ->
     assert make_parts(replace(d, scale_mm_per_unit=30.0), KitSpec(connector="none")).scale_mm_per_unit == 30
 
 
-def test_a_bevel_for_any_shape_makes_the_same_pieces_whatever_the_joints() -> None:
+def dented() -> TriMesh:
+    """The geodesic sphere with one five-valent vertex mirrored in the plane of its neighbours: the same lengths."""
     sphere = geodesic()
-    flat = sphere.moved(sphere.vertices * [1, 1, 0.8])
-    bent, flatter = (replace(decomposed(mesh, 1), scale_mm_per_unit=80.0) for mesh in (sphere, flat))
-    flatter = replace(flatter, class_lengths=bent.class_lengths)
-    wide = make_parts(bent, KitSpec(bevel_degrees=(30, 60)))
-    one, other = wide.parts[0].solid, make_parts(flatter, KitSpec(bevel_degrees=(30, 60))).parts[0].solid
-    assert one.volume == pytest.approx(other.volume)
-    assert (one & other).volume == pytest.approx(one.volume)
-    assert make_parts(bent, KitSpec()).groove_mm.mean() < wide.groove_mm.mean() / 2
+    vertex = int(np.flatnonzero(sphere.valence == 5)[0])
+    around = np.unique(sphere.edges[(sphere.edges == vertex).any(axis=1)])
+    middle = sphere.vertices[around[around != vertex]].mean(axis=0)
+    vertices = sphere.vertices.copy()
+    vertices[vertex] = 2 * middle - vertices[vertex]
+    return sphere.moved(vertices)
 
 
-def test_notes_count_the_joints_beyond_a_bevel_for_any_shape() -> None:
-    notes = " ".join(made(icosahedron(), bevel_degrees=(10, 40)).notes)
-    assert "30 joints bend beyond the 10° concave or 40° convex" in notes
-    assert "to 42° and 42° at most" in notes
-    assert "stops short" not in notes
-    assert "bend beyond" not in " ".join(made(icosahedron(), bevel_degrees=(10, 42)).notes)
+@pytest.mark.parametrize("connector", ["hinge", "box"])
+def test_a_bevel_for_any_shape_makes_the_same_files_whatever_the_joints(connector) -> None:
+    def files(mesh: TriMesh) -> dict[str, bytes]:
+        spec = KitSpec(connector=connector, bevel_degrees=(60, 90))
+        made = make_parts(replace(decomposed(mesh), scale_mm_per_unit=60.0), spec)
+        solids = [(f"class {part.class_index}", part.solid) for part in made.parts]
+        solids += [(one.name, one.solid) for one in made.connectors]
+        return {name: stl_bytes(rounded(solid.mesh())) for name, solid in solids}
+
+    bends = [np.degrees(bend_radians(mesh)) for mesh in (geodesic(), dented())]
+    assert bends[0].min() > 10
+    assert bends[1].min() < -10
+    one, other = files(geodesic()), files(dented())
+    assert one == other
+    assert len(one) == 3
+
+
+def test_a_bevel_for_any_shape_costs_a_groove_and_the_notes_say_so() -> None:
+    own, wide = made(icosahedron()), made(icosahedron(), bevel_degrees=(30, 60))
+    assert own.groove_mm.mean() < wide.groove_mm.mean() / 2
+    assert wide.groove_choices[0].mean_mm == pytest.approx(own.groove_mm.mean(), rel=0.1)
+    note = wide.notes[-1]
+    assert f"grooves are {wide.groove_mm.mean():.1f} mm wide" in note
+    assert f"make them {wide.groove_choices[0].mean_mm:.1f}" in note
+
+
+def test_a_joint_beyond_the_given_bends_is_refused_with_its_place_and_angle() -> None:
+    with pytest.raises(FitError, match=r"bends by 41\.8° \(convex\)") as caught:
+        made(icosahedron(), bevel_degrees=(10, 40))
+    error = caught.value
+    assert "29 more joints" in error.problem
+    assert "40° convex" in error.wanted
+    assert "--bevel-degrees 10,42" in error.remedy
+    x, y, z = (float(word) for word in error.problem.split("(")[1].split(")")[0].split(","))
+    mesh = icosahedron().scaled(made(icosahedron(), bevel_degrees=(10, 42)).scale_mm_per_unit)
+    middles = mesh.vertices[mesh.edges].mean(axis=1)
+    assert np.linalg.norm(middles - [x, y, z], axis=1).min() < 3  # the size is another
+    with pytest.raises(FitError, match="concave"):
+        made(dented(), bevel_degrees=(10, 60), size_mm=150)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_variants_are_parts_of_their_class_and_narrow_the_grooves(count) -> None:
+    d = decomposed(potato(3), 4)
+    one, made = make_parts(d, KitSpec(size_mm=200)), make_parts(d, KitSpec(size_mm=200, bevel_variants=count))
+    assert [part.class_index for part in made.parts] == sorted(part.class_index for part in made.parts)
+    assert {part.variant for part in made.parts} == ({0} if count == 1 else {1, 2})
+    assert made.groove_mm.mean() <= one.groove_mm.mean()
+    chosen = made.groove_choices[count - 1]
+    assert (chosen.bevel_variants, chosen.moulds) == (count, len(made.parts))
+    assert chosen.mean_mm == pytest.approx(made.groove_mm.mean())
+    assert chosen.max_mm == pytest.approx(made.groove_mm.max())
+    assert (np.array([p.class_index for p in made.parts])[made.face_part] == d.face_class).all()
 
 
 def test_scale_of_the_source_does_not_matter_at_a_fixed_size() -> None:

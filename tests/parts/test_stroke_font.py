@@ -1,4 +1,4 @@
-from string import ascii_uppercase
+from string import ascii_uppercase, digits
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from drkid.parts.stroke_font import strokes
 
 
-@pytest.mark.parametrize("letter", ascii_uppercase)
+@pytest.mark.parametrize("letter", ascii_uppercase + digits)
 def test_letters_are_as_tall_as_asked_and_centred(letter) -> None:
     lines = strokes(letter, 3.0)
     assert np.ptp(lines[..., 1]) == pytest.approx(3.0)
@@ -15,7 +15,7 @@ def test_letters_are_as_tall_as_asked_and_centred(letter) -> None:
 
 
 def test_letters_differ_and_words_are_wider() -> None:
-    assert len({strokes(c, 1.0).tobytes() for c in ascii_uppercase}) == 26
+    assert len({strokes(c, 1.0).tobytes() for c in ascii_uppercase + digits}) == 36
     assert np.ptp(strokes("AB", 3.0)[..., 0]) > 1.9 * np.ptp(strokes("A", 3.0)[..., 0])
     with pytest.raises(KeyError):
         strokes("a", 1.0)

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from drkid.congruence.closest_point import TriangleTree, closest_points, triangle_tree
-from drkid.measure import Dihedral, dihedral, sample
+from drkid.measure import Dihedral, bend_radians, dihedral, sample
 from drkid.mesh import Floats, TriMesh
 from drkid.spec import KitSpec
 
@@ -17,12 +17,15 @@ SAMPLES = 1500  # on M_s; of the other mesh its vertices, edge middles and face 
 # Each term is 1 at what a research trial reached at 172 faces: only then do the weights compare like with like.
 UNIT_MEAN_PERCENT, UNIT_MAX_PERCENT, UNIT_DEGREES, UNIT_CONCAVE_PERCENT = 0.5, 2.5, 4.0, 5.0
 
+UNIT_BEYOND_DEGREES = 1.0  # pieces of a fixed bevel do not go together at such a joint: nearly any other mesh is better
+
 
 @dataclass(frozen=True)
 class Quality:
     """d_H(M_s, M_f) in percent of the bounding-box diagonal, and dihedrals beyond those of M_s.
 
-    `farthest` is the place of the largest distance.
+    `farthest` is the place of the largest distance; `beyond_degrees` is by how much joints bend beyond
+    `spec.bevel_degrees`, added up, and 0 where those are not given.
     """
 
     mean_percent: float
@@ -31,6 +34,7 @@ class Quality:
     excess_p95_degrees: float
     excess_concave_percent: float
     farthest: tuple[float, float, float]
+    beyond_degrees: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +74,15 @@ class Yardstick:
             max(0.0, angles.p95_degrees - self._angles.p95_degrees),
             max(0.0, angles.concave_percent - self._angles.concave_percent),
             (x, y, z),
+            self._beyond_degrees(mesh),
         )
+
+    def _beyond_degrees(self, mesh: TriMesh) -> float:
+        if self.spec.bevel_degrees is None:
+            return 0.0
+        concave, convex = self.spec.bevel_degrees
+        bend = np.degrees(bend_radians(mesh))
+        return float(np.maximum(np.maximum(bend - convex, -concave - bend), 0.0).sum())
 
     def score(self, quality: Quality) -> float:
         """The weighted sum, less being better."""
@@ -79,4 +91,5 @@ class Yardstick:
             + self.spec.weight_max * quality.max_percent / UNIT_MAX_PERCENT
             + self.spec.weight_dihedral * quality.excess_p95_degrees / UNIT_DEGREES
             + self.spec.weight_concave * quality.excess_concave_percent / UNIT_CONCAVE_PERCENT
+            + quality.beyond_degrees / UNIT_BEYOND_DEGREES
         )

@@ -74,6 +74,7 @@ class JointDocument(Model):
     edge: tuple[Vertex, Vertex]
     dihedral_degrees: float = Field(description="inner angle, more than 180 where concave")
     connector: list[str] = Field(description="the half in each of `faces`, or the one key; empty for none")
+    groove_mm: float | None = Field(default=None, ge=0, description="widest visible gap between the two pieces")
 
 
 class HardwareDocument(Model):
@@ -117,11 +118,21 @@ class DihedralDocument(Model):
     concave_percent: float
 
 
+class GrooveChoiceDocument(Model):
+    """The same kit if every class had at most so many bevel variants, made for this shape alone."""
+
+    bevel_variants: int = Field(ge=1)
+    moulds: int = Field(ge=1, description="of pieces, in all")
+    mean_mm: float
+    max_mm: float
+
+
 class GrooveDocument(Model):
     """Visible gap between pieces at their joints."""
 
     mean_mm: float
     max_mm: float
+    choices: list[GrooveChoiceDocument] = Field(default=[], description="what each further mould buys")
 
 
 class RigidityDocument(Model):
@@ -228,6 +239,7 @@ class MetricsDocument(Model):
     rigidity: RigidityDocument | None = None
     seconds: dict[str, float]
     assembly: AssemblyDocument | None = None
+    unique_connector_parts: int | None = Field(default=None, ge=0, description="printed shapes of connectors")
 
 
 class FindingDocument(Model):

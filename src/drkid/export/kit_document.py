@@ -18,7 +18,7 @@ MOST_RECORDS = 500  # of the convergence history; a plot shows no more
 
 def part_name(part: Part) -> str:
     """The file of a part."""
-    return part_file(part.class_index, part.handedness)
+    return part_file(part.class_index, part.handedness, part.variant)
 
 
 def connector_names(kit: Kit) -> list[str]:
@@ -47,8 +47,14 @@ def kit_document(kit: Kit) -> doc.KitDocument:
             for piece in kit.assembly.pieces
         ],
         joints=[
-            doc.JointDocument(faces=j.faces, edge=j.edge, dihedral_degrees=j.dihedral_degrees, connector=connectors)
-            for j in kit.assembly.joints
+            doc.JointDocument(
+                faces=j.faces,
+                edge=j.edge,
+                dihedral_degrees=j.dihedral_degrees,
+                connector=connectors,
+                groove_mm=groove,
+            )
+            for j, groove in zip(kit.assembly.joints, kit.part_set.groove_mm.tolist(), strict=True)
         ],
         hardware=_hardware(kit),
         assembly=[
@@ -147,7 +153,11 @@ def _metrics(metrics: Metrics) -> doc.MetricsDocument:
             p95_degrees=metrics.dihedral_p95_degrees,
             concave_percent=metrics.concave_percent,
         ),
-        groove=doc.GrooveDocument(mean_mm=metrics.groove_mean_mm, max_mm=metrics.groove_max_mm),
+        groove=doc.GrooveDocument(
+            mean_mm=metrics.groove_mean_mm,
+            max_mm=metrics.groove_max_mm,
+            choices=[doc.GrooveChoiceDocument(**asdict(choice)) for choice in metrics.groove_choices],
+        ),
     )
 
 

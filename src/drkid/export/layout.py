@@ -19,10 +19,11 @@ REPORT = "report.html"
 COUPON = "coupon.stl"
 
 
-def part_file(index: int, handedness: str) -> str:
-    """File of a class's part: its letter, and its hand where mirror images differ."""
+def part_file(index: int, handedness: str, variant: int = 0) -> str:
+    """File of a class's part: its letter, the number of its bevel where it has several, its hand where hands differ."""
+    number = variant or ""
     hand = "" if handedness == "any" else f"_{handedness}"
-    return f"{PARTS}/{class_id(index)}{hand}.stl"
+    return f"{PARTS}/{class_id(index)}{number}{hand}.stl"
 
 
 def connector_file(name: str) -> str:

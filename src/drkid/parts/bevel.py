@@ -1,11 +1,17 @@
 """Bevels that cannot collide: the planes between neighbours, and the least inset that serves a whole class."""
 
+from math import ceil
+
 import numpy as np
 
-from drkid.mesh import Floats, Ints
+from drkid.errors import FitError
+from drkid.measure import bend_radians
+from drkid.mesh import Floats, Ints, TriMesh
 from drkid.parts.class_triangle import equal_sides, is_equilateral
 from drkid.parts.members import Members
+from drkid.spec import KitSpec
 
+SAME_BEND_DEGREES = 1e-6  # beyond a given bend: rounding
 SHARPEST_JOINT_DEGREES = 140.0  # bends beyond this are served as if they were this sharp
 
 
@@ -85,6 +91,33 @@ def bevel_insets(bends_degrees: tuple[float, float], thickness_mm: float, swing_
     """
     concave, convex = np.tan(np.radians(np.add(bends_degrees, swing_degrees)) / 2)
     return thickness_mm / 2 * np.array([[convex], [concave]])
+
+
+def require_bends(mesh_mm: TriMesh, spec: KitSpec) -> None:
+    """Check that no joint of M_f, in mm, bends beyond what every piece is bevelled for, if that is given.
+
+    Raises:
+        FitError: one does; names the worst joint, its place and its angle, and how many there are.
+    """
+    if spec.bevel_degrees is None:
+        return
+    concave, convex = spec.bevel_degrees
+    bend = np.degrees(bend_radians(mesh_mm))
+    beyond = np.maximum(bend - convex, -concave - bend)
+    worst, count = int(beyond.argmax()), int((beyond > SAME_BEND_DEGREES).sum())
+    if not count:
+        return
+    (a, b), (v, w) = mesh_mm.edge_faces[worst].tolist(), mesh_mm.edges[worst].tolist()
+    x, y, z = mesh_mm.vertices[[v, w]].mean(axis=0)
+    others = f"; {count - 1} more joints do" if count > 1 else ""
+    wider = ",".join(f"{ceil(max(limit, most)):g}" for limit, most in ((concave, -bend.min()), (convex, bend.max())))
+    raise FitError(
+        f"the joint of faces {a} and {b}, at ({x:.1f}, {y:.1f}, {z:.1f}) mm, bends by {abs(bend[worst]):.1f}° "
+        f"({'convex' if bend[worst] > 0 else 'concave'}), more than every piece is bevelled for{others}",
+        wanted=f"bends from {concave:g}° concave to {convex:g}° convex",
+        found=f"{max(0.0, -bend.min()):.1f}° concave and {max(0.0, bend.max()):.1f}° convex at most",
+        remedy=f"more --faces, another --seed, or other pieces for wider bends (--bevel-degrees {wider})",
+    )
 
 
 def limited(insets_mm: Floats, ridge_mm: Floats, deepest_mm: float, hold_share: float) -> Floats:

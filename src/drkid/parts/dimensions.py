@@ -195,8 +195,8 @@ def _grip(
     """Reach, length along the edge and start of the full width of a half around a barrel."""
     start = grip_start_mm(barrel_mm / 2, gap_mm, sharpest_degrees)
     least = max(barrel_mm, LEAST_GRIP_MM)
-    roof = barrel_mm / 2 + given.clearance + given.wall / 2  # see held_height_mm
-    held = roof * _half_tangent(sharpest_degrees) + HOLD_SHARE * least
+    height = barrel_mm / 2 + given.clearance + given.wall / 2  # held_height_mm, and below deepest_bevel_mm of the other
+    held = given.clearance / 2 + height * _half_tangent(sharpest_degrees) + HOLD_SHARE * least
     return max(barrel_mm / 2 + least, start + wall_mm, held), across_mm, start
 
 

@@ -48,6 +48,7 @@ def margins(triangle: Floats, prismoid: Prismoid, dimensions: Dimensions) -> Ite
     if dimensions.connector == "none":
         return
     wall = dimensions.min_wall_mm
+    bevels = list(prismoid.bevels(triangle))
     levels = prismoid.levels_mm[prismoid.levels_mm < dimensions.pocket_height_mm / 2].tolist()
     for height in sorted({*levels, *_telling_heights(dimensions, low)}):
         outline = prismoid.outline(height)
@@ -55,7 +56,7 @@ def margins(triangle: Floats, prismoid: Prismoid, dimensions: Dimensions) -> Ite
         between = min(convex_distance(pockets[i], pockets[i - 1]) for i in range(3))
         yield Margin("wall between two pockets", wall, between)
         across = _bevel_distance(pockets, outline)
-        for bottom, top, slope in prismoid.bevels(triangle):
+        for bottom, top, slope in bevels:
             if bottom <= height <= top:
                 distance = _nearest(across, slope, height - bottom, top - height)
                 yield Margin("wall between pocket and bevel", wall, distance)

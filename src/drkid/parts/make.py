@@ -10,15 +10,18 @@ import numpy as np
 from drkid.errors import FitError
 from drkid.kit import Connector, Decomposition, Dimensions, Handedness, Part, PartSet, class_id
 from drkid.mesh import Floats, Ints, read_only
+from drkid.parts.bevel import require_bends
+from drkid.parts.bevel_variants import Moulds, moulds
 from drkid.parts.class_triangle import LEFT_CORNERS, is_mirror_symmetric, laid_down, printed_lengths
 from drkid.parts.dimensions import proposals
 from drkid.parts.fit import FITS_MM, Margin, margins, smallest_scale
-from drkid.parts.groove import groove_mm, recesses
+from drkid.parts.groove import groove_mm
+from drkid.parts.groove_choices import groove_choices, recesses_of
 from drkid.parts.hinge import hinge_half
 from drkid.parts.key import box_key
 from drkid.parts.marks import marked
-from drkid.parts.members import Members, members_of
-from drkid.parts.notes import notes
+from drkid.parts.members import Members
+from drkid.parts.notes import groove_notes, notes
 from drkid.parts.pocket import pocket, side_frames
 from drkid.parts.prismoid import Prismoid
 from drkid.parts.process_findings import findings
@@ -37,29 +40,34 @@ SMALLER = 1 - 1e-4  # of a scale: what another connector must save to be taken
 def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress = silent) -> PartSet:
     """The printed shapes of a kit: pieces with bevels and pockets, connectors, and which face uses which.
 
-    One piece a class where it is its own mirror image, a left and a right one where it is not and both are used.
+    One piece a class where it is its own mirror image, a left and a right one where it is not and both are used;
+    `spec.bevel_variants` of each. An equilateral piece is laid down in the way that narrows its bevels.
     The scale is the decomposition's own where given edge lengths fix it. Else it makes the longest side of the mesh's
     bounding box `spec.size_mm`, or is the smallest at which all pockets and walls fit, rounded up to whole mm of that
     side. The inner face of each is marked.
 
     Raises:
-        FitError: pockets and walls do not fit at the asked size or thickness, or a piece is larger than the bed.
+        FitError: pockets and walls do not fit at the asked size or thickness, a piece is larger than the bed, or a
+            joint bends beyond `spec.bevel_degrees`.
     """
     progress("laying pieces on faces", 0.0)
-    members = members_of(decomposition)
+    found = moulds(decomposition, spec, spec.bevel_variants)
+    members = found.members
     bends = spec.bevel_degrees or (degrees(float(np.abs(members.bend_radians).max())),)
     sharpest = max(bends) + spec.swing_degrees
     progress("finding the size", 0.2)
-    design = _chosen([_Design(decomposition, members, d, spec) for d in proposals(spec, sharpest)])
+    design = _chosen([_Design(found, d, spec) for d in proposals(spec, sharpest)])
     scale = _scale(design)
+    require_bends(decomposition.mesh.scaled(scale), spec)
     progress("cutting parts", 0.5)
     shapes = design.pieces(scale)
     parts, face_part = _parts(design, shapes, scale)
     parts, unmarked = _marked(parts, design)
     for part in parts:
         _require_bed(part, spec)
-    insets = np.stack([s.insets(t) for s, t in zip(shapes, design.triangles(scale), strict=True)])
-    recess = recesses(members, insets, scale, design.dimensions.thickness_mm)
+    recess = recesses_of(found, design.dimensions, spec, scale)
+    width = groove_mm(decomposition.mesh, members, recess)
+    choices = groove_choices(decomposition, design.dimensions, spec, scale)
     progress("cutting parts", 1.0)
     return PartSet(
         scale_mm_per_unit=scale,
@@ -68,11 +76,12 @@ def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress =
         connectors=_connectors(design.dimensions),
         face_part=face_part,
         face_turn=members.turn,
-        groove_mm=read_only(groove_mm(decomposition.mesh, members, recess)),
+        groove_mm=read_only(width),
+        notes=(*notes(found, design.dimensions, spec, recess, scale), *groove_notes(width, choices, spec), *unmarked),
         findings=findings(
-            design.triangles(scale), shapes, np.unique(members.face_class).tolist(), design.dimensions, spec
+            design.triangles(scale), shapes, np.unique(members.face_class).tolist(), found, design.dimensions, spec
         ),
-        notes=(*notes(decomposition, members, design.dimensions, spec, recess, scale), *unmarked),
+        groove_choices=choices,
     )
 
 
@@ -80,10 +89,17 @@ def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress =
 class _Design:
     """All but the scale."""
 
-    decomposition: Decomposition
-    members: Members
+    moulds: Moulds
     dimensions: Dimensions
     spec: KitSpec
+
+    @property
+    def decomposition(self) -> Decomposition:
+        return self.moulds.decomposition
+
+    @property
+    def members(self) -> Members:
+        return self.moulds.members
 
     @property
     def longest(self) -> float:
@@ -103,7 +119,7 @@ class _Design:
         return thickened(self.decomposition.class_lengths, self.members, self.dimensions, self.spec, scale)
 
     def tightest(self, scale: float) -> tuple[int, Margin]:
-        """The class with the least slack of those in use, and where."""
+        """The mould with the least slack of those in use, and where."""
         used = np.unique(self.members.face_class)
         triangles, pieces = self.triangles(scale), self.pieces(scale)
         found = [(int(k), m) for k in used for m in margins(triangles[k], pieces[k], self.dimensions)]
@@ -157,9 +173,10 @@ def _scale(design: _Design) -> float:
         return design.smallest_size_mm() / design.longest
     index, margin = design.tightest(size / design.longest)
     if margin.slack_mm < FITS_MM:
-        sides = ", ".join(f"{x:.1f}" for x in design.decomposition.class_lengths[index] * size / design.longest)
+        name, lengths = design.moulds.name(index), design.decomposition.class_lengths[index] * size / design.longest
+        sides = ", ".join(f"{x:.1f}" for x in lengths)
         raise FitError(
-            f"the {margin.what} of class {class_id(index)} (sides {sides} mm) does not fit at size_mm {size:.4g}",
+            f"the {margin.what} of class {name} (sides {sides} mm) does not fit at size_mm {size:.4g}",
             wanted=f"{margin.needed_mm:.2f} mm",
             found=f"{margin.available_mm:.2f} mm",
             remedy=f"a larger print (--size-mm {design.smallest_size_mm()} or more), fewer pieces (--faces), "
@@ -178,7 +195,7 @@ def _required_scale(design: _Design, scale: float) -> float:
     lengths = np.unique(np.round(design.decomposition.class_lengths * scale, 6))
     longer = ",".join(f"{ceil(10 * factor * x) / 10:g}" for x in lengths)
     raise FitError(
-        f"the {margin.what} of class {class_id(index)} does not fit at the given lengths (sides {sides} mm)",
+        f"the {margin.what} of class {design.moulds.name(index)} does not fit at the given lengths (sides {sides} mm)",
         wanted=f"{margin.needed_mm:.2f} mm",
         found=f"{margin.available_mm:.2f} mm",
         remedy=f"lengths {factor:.2f} times as long (--palette {longer}), a thinner rod (--rod-diameter-mm), "
@@ -187,7 +204,7 @@ def _required_scale(design: _Design, scale: float) -> float:
 
 
 def _parts(design: _Design, shapes: tuple[Prismoid, ...], scale: float) -> tuple[tuple[Part, ...], Ints]:
-    """The parts in use, by class, right before left, and which one each face is made from."""
+    """The parts in use, by class and bevel variant, right before left, and which one each face is made from."""
     members, parts = design.members, list[Part]()
     face_part = np.empty(len(members.face_class), np.int64)
     for index, triangle in enumerate(design.triangles(scale)):
@@ -207,14 +224,15 @@ def _right_part(design: _Design, index: int, triangle: Floats, shape: Prismoid) 
         solid = solid.minus_all([pocket(design.dimensions).moved(frame) for frame in frames])
     symmetric = is_mirror_symmetric(design.decomposition.class_lengths[index])
     hand: Handedness = "any" if symmetric else "right"
-    return Part(index, hand, _flat(triangle), frames, solid)
+    own, variant = int(design.moulds.class_index[index]), int(design.moulds.variant[index])
+    return Part(own, hand, _flat(triangle), frames, solid, variant)
 
 
 def _mirrored(right: Part, dimensions: Dimensions) -> Part:
     """The left part of a class: the mirror image of the right one, first side along x again."""
     triangle = (right.corners[:, :2] * [-1, 1])[list(LEFT_CORNERS)]
     frames = side_frames(triangle, dimensions.key_bend_degrees / 2)
-    return Part(right.class_index, "left", _flat(triangle), frames, right.solid.moved(MIRROR))
+    return Part(right.class_index, "left", _flat(triangle), frames, right.solid.moved(MIRROR), right.variant)
 
 
 def _marked(parts: tuple[Part, ...], design: _Design) -> tuple[tuple[Part, ...], tuple[str, ...]]:
@@ -229,7 +247,7 @@ def _marked(parts: tuple[Part, ...], design: _Design) -> tuple[tuple[Part, ...],
         made.append(found)
         hand = "" if part.handedness == "any" else f" ({part.handedness})"
         if missing:
-            notes_.append(f"Class {class_id(part.class_index)}{hand}: no room for the {', '.join(missing)} inside.")
+            notes_.append(f"Class {part.name}{hand}: no room for the {', '.join(missing)} inside.")
     return tuple(made), tuple(notes_)
 
 

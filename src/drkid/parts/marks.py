@@ -1,14 +1,14 @@
 """Marks: class letter and side ticks, engraved on the inner face where they leave every wall whole."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, sqrt
 
 import numpy as np
 from numba import njit
 from scipy.ndimage import map_coordinates
 
-from drkid.kit import Dimensions, Part, class_id
+from drkid.kit import Dimensions, Part
 from drkid.mesh import Floats, Ints
 from drkid.parts.class_triangle import SAME_LENGTH
 from drkid.parts.detent import groove
@@ -72,7 +72,7 @@ def marked(part: Part, dimensions: Dimensions, width_mm: float, depth_mm: float)
     lines = np.concatenate([found.letter, found.ticks])
     low = -dimensions.thickness_mm / 2
     solid = part.solid - _engraving(lines, width_mm, low - depth_mm, low + depth_mm) if len(lines) else part.solid
-    return Part(part.class_index, part.handedness, part.corners, part.side_frames, solid), found.missing
+    return replace(part, solid=solid), found.missing
 
 
 def marks(part: Part, dimensions: Dimensions, width_mm: float, depth_mm: float) -> Marks:
@@ -80,7 +80,7 @@ def marks(part: Part, dimensions: Dimensions, width_mm: float, depth_mm: float) 
     ground = _ground(part, dimensions, width_mm, depth_mm)
     best: Marks | None = None
     for height in HEIGHTS:
-        letter = _letter(class_id(part.class_index), height * width_mm, ground, width_mm)
+        letter = _letter(part.name, height * width_mm, ground, width_mm)
         if letter is not None:
             found = Marks(letter, *_ticks(part, dimensions, ground, letter, width_mm))
             best = found if best is None or len(found.missing) < len(best.missing) else best

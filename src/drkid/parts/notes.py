@@ -4,31 +4,25 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from drkid.kit import Decomposition, Dimensions, class_id
+from drkid.kit import Dimensions, GrooveChoice
 from drkid.mesh import Floats
 from drkid.parts.bevel import SHARPEST_JOINT_DEGREES, demanded
+from drkid.parts.bevel_variants import Moulds
 from drkid.parts.groove import touching_mm
 from drkid.parts.members import Members
-from drkid.spec import KitSpec
+from drkid.spec import FOLLOWING, KitSpec
 
 TOUCH_MM = 1e-3  # pieces that reach into one another by less are drawn apart by any process
 
 
-def notes(
-    decomposition: Decomposition,
-    members: Members,
-    dimensions: Dimensions,
-    spec: KitSpec,
-    recess_mm: Floats,
-    scale: float,
-) -> tuple[str, ...]:
+def notes(moulds: Moulds, dimensions: Dimensions, spec: KitSpec, recess_mm: Floats, scale: float) -> tuple[str, ...]:
     """The sentences, most general first; `recess_mm` (F, 2, 3) as `groove.recesses` gives it."""
-    touching = touching_mm(decomposition.mesh, members, recess_mm, scale)
+    members = moulds.members
+    touching = touching_mm(moulds.decomposition.mesh, members, recess_mm, scale)
     return (
         *_connector_notes(members, dimensions),
         *_touching_notes(touching, spec),
-        *_short_notes(members, dimensions, spec, recess_mm, scale),
-        *_bevel_notes(members, spec),
+        *_short_notes(moulds, dimensions, spec, recess_mm, scale),
         *_limit_notes(members, spec),
     )
 
@@ -62,12 +56,38 @@ def _touching_notes(touching_mm: Floats, spec: KitSpec) -> Iterator[str]:
         )
 
 
+def groove_notes(groove_mm: Floats, choices: tuple[GrooveChoice, ...], spec: KitSpec) -> tuple[str, ...]:
+    """What a bevel for any shape costs, or what further moulds would buy; `groove_mm` (E,) is what the kit has."""
+    if not choices:
+        return ()
+    if spec.bevel_degrees is not None:
+        own = choices[0]
+        return (
+            f"One bevel for every shape: grooves are {groove_mm.mean():.1f} mm wide in the mean and "
+            f"{groove_mm.max():.1f} mm at most; bevels for this shape alone would make them {own.mean_mm:.1f} and "
+            f"{own.max_mm:.1f} mm.",
+        )
+    steps = ", ".join(
+        f"{c.mean_mm:.1f} and {c.max_mm:.1f} mm with {c.moulds} (--bevel-variants {c.bevel_variants})"
+        for c in choices
+        if c.bevel_variants > spec.bevel_variants
+    )
+    if not steps:
+        return ()
+    own = choices[spec.bevel_variants - 1]
+    return (
+        f"Grooves are {own.mean_mm:.1f} mm wide in the mean and {own.max_mm:.1f} mm at most with {own.moulds} "
+        f"{'mould' if own.moulds == 1 else 'moulds'}; {steps}.",
+    )
+
+
 def _short_notes(
-    members: Members, dimensions: Dimensions, spec: KitSpec, recess_mm: Floats, scale: float
+    moulds: Moulds, dimensions: Dimensions, spec: KitSpec, recess_mm: Floats, scale: float
 ) -> Iterator[str]:
-    """Sides whose bevel was cut down to keep the connector's hold, class by class."""
-    if spec.thickening != "bisector" or spec.bevel_degrees is not None:
+    """Sides whose bevel was cut down to keep the connector's hold, mould by mould."""
+    if spec.thickening not in FOLLOWING or spec.bevel_degrees is not None:
         return
+    members = moulds.members
     rest = demanded(members, scale, dimensions.thickness_mm, 0.0)
     swung = demanded(members, scale, dimensions.thickness_mm, spec.swing_degrees)
     slack = scale * (members.far - members.near)[:, None, :]
@@ -76,24 +96,10 @@ def _short_notes(
         own = missing[members.face_class == index]
         for side in np.flatnonzero((own > TOUCH_MM).any(axis=0)):
             yield (
-                f"Class {class_id(index)}, side {side + 1}: its bevel stops short of what every joint asks, or the "
+                f"Class {moulds.name(index)}, side {side + 1}: its bevel stops short of what every joint asks, or the "
                 f"connector would have no hold; {int((own[:, side] > TOUCH_MM).sum())} sides lack up to "
                 f"{own[:, side].max():.2f} mm and touch or cannot swing by {spec.swing_degrees:g}°."
             )
-
-
-def _bevel_notes(members: Members, spec: KitSpec) -> Iterator[str]:
-    """Joints beyond the bends that pieces are bevelled for, whatever the shape."""
-    if spec.bevel_degrees is None:
-        return
-    concave, convex = spec.bevel_degrees
-    bend = np.degrees(members.bend_radians)
-    count = int(((bend < -concave) | (bend > convex)).sum()) // 2
-    if count:
-        yield (
-            f"{count} joints bend beyond the {concave:g}° concave or {convex:g}° convex that every piece is bevelled "
-            f"for, to {bend.min():.0f}° and {bend.max():.0f}° at most: what they join touches."
-        )
 
 
 def _limit_notes(members: Members, spec: KitSpec) -> Iterator[str]:

@@ -4,24 +4,30 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from drkid.kit import Dimensions, Finding, class_id
+from drkid.kit import Dimensions, Finding
 from drkid.mesh import Floats
+from drkid.parts.bevel_variants import Moulds
 from drkid.parts.fit import margins
 from drkid.parts.prismoid import Prismoid
 from drkid.spec import KitSpec
 
 
 def findings(
-    triangles: Floats, pieces: tuple[Prismoid, ...], used: list[int], dimensions: Dimensions, spec: KitSpec
+    triangles: Floats,
+    pieces: tuple[Prismoid, ...],
+    used: list[int],
+    moulds: Moulds,
+    dimensions: Dimensions,
+    spec: KitSpec,
 ) -> tuple[Finding, ...]:
-    """Every finding, class by class, then the connector's; triangles (k, 3, 2), `used` the classes that have pieces.
+    """Every finding, mould by mould, then the connector's; triangles (m, 3, 2), `used` the moulds that have pieces.
 
     Pieces are printed on their outer face, pockets and marks upwards, so that nothing but the lean of a side hangs
     over; moulds open along the piece's normal.
     """
     found: list[Finding] = []
     for k in used:
-        subject = f"class {class_id(k)}"
+        subject = f"class {moulds.name(k)}"
         found += _walls(subject, triangles[k], pieces[k], dimensions)
         found += _sides(subject, triangles[k], pieces[k], spec)
     return (*found, *_process(dimensions, spec))
@@ -40,27 +46,28 @@ def _walls(subject: str, triangle: Floats, piece: Prismoid, dimensions: Dimensio
 
 def _sides(subject: str, triangle: Floats, piece: Prismoid, spec: KitSpec) -> Iterator[Finding]:
     """Draft of the sides in a mould, and their lean outwards from the outer face on, on which a piece is printed."""
-    inner, outer = piece.insets(triangle)
-    lean = np.degrees(np.arctan((outer - inner) / piece.thickness_mm))
+    lean = -np.degrees(np.arctan([opening for _, _, opening in piece.bevels(triangle)]))  # (n, 3)
     preset = spec.preset
     if preset.draft_degrees:
-        side = int(np.abs(lean).argmin())
+        draft = np.abs(lean).min(axis=0)
+        side = int(draft.argmin())
         yield Finding(
             subject,
             f"draft of side {side + 1}",
             preset.draft_degrees,
-            float(abs(lean[side])),
+            float(draft[side]),
             "degrees",
             "at least",
             "its walls are upright in the mould: draft them there, or take another --seed",
         )
     if preset.overhang_degrees < UPRIGHT_DEGREES:
-        side = int(lean.argmax())
+        hanging = lean.max(axis=0)
+        side = int(hanging.argmax())
         yield Finding(
             subject,
             f"overhang of side {side + 1}, outer face down",
             preset.overhang_degrees,
-            max(float(lean[side]), 0.0),
+            max(float(hanging[side]), 0.0),
             "degrees",
             "at most",
             "print it with supports, or inner face down",

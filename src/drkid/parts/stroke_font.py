@@ -1,4 +1,4 @@
-"""Stroke font: capital letters of few straight strokes, for engraving."""
+"""Stroke font: capital letters and digits of few straight strokes, for engraving."""
 
 import numpy as np
 
@@ -34,14 +34,24 @@ _GLYPHS = {  # polylines of grid points, a digit for x and one for y
     "X": "00 46, 06 40",
     "Y": "06 23 46, 23 20",
     "Z": "06 46 00 40",
+    "0": "10 01 05 16 36 45 41 30 10, 01 45",
+    "1": "05 26 20, 10 30",
+    "2": "05 16 36 45 44 00 40",
+    "3": "05 16 36 45 44 33 42 41 30 10 01, 13 33",
+    "4": "40 46 02 42",
+    "5": "46 06 03 33 42 41 30 00",
+    "6": "45 36 16 05 01 10 30 41 42 33 03",
+    "7": "06 46 10",
+    "8": "13 04 05 16 36 45 44 33 13 02 01 10 30 41 42 33",
+    "9": "01 10 30 41 45 36 16 05 04 13 43",
 }
 
 
 def strokes(text: str, height: float) -> Floats:
-    """(n, 2, 2): the ends of the strokes of capital letters, `height` tall without the strokes' width, centred at 0.
+    """(n, 2, 2): the ends of the strokes of letters and digits, `height` tall without the strokes' width, centred at 0.
 
     Raises:
-        KeyError: a character is no capital letter.
+        KeyError: a character is neither a capital letter nor a digit.
     """
     found: list[Floats] = []
     for place, letter in enumerate(text):
