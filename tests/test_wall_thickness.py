@@ -54,9 +54,8 @@ def test_the_faces_that_are_named_resolve_it():
     require_walls(sheet, int(named[1]))
     with pytest.raises(InputError):
         require_walls(sheet, int(named[1]) - 20)
-    simplified = simplify(
-        Surface(sheet, Source("sheet", "0" * 64)), KitSpec(faces=int(named[1]), lloyd_iterations=1, newton_iterations=1)
-    ).mesh
+    spec = KitSpec(faces=int(named[1]), lloyd_iterations=1, newton_iterations=1)
+    simplified = simplify(Surface(sheet, Source("sheet", "0" * 64)), spec).mesh
     assert simplified.is_closed_manifold
 
 
