@@ -24,7 +24,7 @@ import tifffile
 
 FORMATS = ("labels.npy", "labels.mrc", "labels.nii", "labels.nii.gz", "labels.tif", "labels.nrrd")
 RESULTS = Path(__file__).parent / "results" / "surface.json"
-LABEL = 108  # near the middle, the largest
+LABEL = 108  # the largest, at the end of the volume: its surface is closed there, the plain one is not
 
 
 def labels(size: int) -> np.ndarray:

@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 import drkid
@@ -255,3 +256,26 @@ def test_the_package_offers_its_names_and_no_others():
     assert callable(drkid.make_kit)
     with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
         _ = drkid.nonsense
+
+
+def test_inspect_recommends_faces_for_a_distance(potato_file, capsys):
+    assert run(["inspect", str(potato_file), "--for-distance-percent", "1.2"]) == 0
+    text = plain(capsys.readouterr().out)
+    assert "expected distance from the surface" in text
+    assert re.search(r"recommended --faces \d+: [\d.]+ % mean", text)
+    assert run(["inspect", str(potato_file), "--for-distance-percent", "1.2", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["recommended"]["mean_percent"] <= 1.2
+    assert [row["faces"] for row in found["distances"]] == [80, 120, 172, 260, 400, 600, 1000]
+    assert "above 0" in refused(["inspect", str(potato_file), "--for-distance-percent", "0"], capsys)
+
+
+def test_max_genus_is_typed_and_told(tmp_path, capsys):
+    block = np.zeros((14, 14, 14), np.uint8)
+    block[2:12, 2:12, 2:12] = 1
+    block[6, 6, :] = 0
+    np.save(tmp_path / "block.npy", block)
+    assert run(["inspect", str(tmp_path / "block.npy"), "--max-genus", "0", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["taken"]["genus"] == 0
+    assert any("a handle closed (--max-genus): 1 voxel filled" in note for note in found["notes"])

@@ -7,6 +7,7 @@ import pytest
 import scipy.ndimage as ndi
 import trimesh
 
+from drkid import inspection
 from drkid.data import nucleus_path
 from drkid.errors import InputError
 from drkid.inspection import inspect_source
@@ -15,6 +16,12 @@ from drkid.surface import extract_surface
 from drkid.volume import read_volume
 
 GRID = np.indices((60, 30, 30)).transpose(1, 2, 3, 0)
+
+
+@pytest.fixture(autouse=True)
+def no_remeshes(monkeypatch):
+    """The table of distances takes two remeshes; tests of its own are in test_expected_distance and test_cli."""
+    monkeypatch.setattr(inspection, "expected_distances", lambda *_: ())
 
 
 def save(path, xyz):

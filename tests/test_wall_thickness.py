@@ -1,11 +1,12 @@
 """Walls: how thick, and whether pieces are small enough for them."""
 
 import re
+from functools import cache
 
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drkid.errors import InputError
@@ -17,9 +18,10 @@ from drkid.spec import KitSpec
 from drkid.wall_thickness import even_edge, faces_that_resolve, require_walls, wall_thickness
 
 
+@cache
 def plate(thickness: float, bend: float = 0.0) -> TriMesh:
     """20 × 20 and thin, finely meshed; bent to a wave of an amplitude."""
-    box = trimesh.creation.box((20, 20, thickness)).subdivide_to_size(1.0)
+    box = trimesh.creation.box((20, 20, thickness)).subdivide_to_size(2.0)
     vertices = np.array(box.vertices)
     vertices[:, 2] += bend * np.sin(vertices[:, 0] / 3)
     mesh = trimesh.Trimesh(vertices, box.faces)
@@ -32,6 +34,7 @@ def test_a_plate_is_as_thick_as_it_is(potato):
     assert np.isfinite(wall_thickness(potato)).mean() > 0.5
 
 
+@settings(max_examples=4)
 @given(st.floats(0.01, 100))
 def test_the_verdict_does_not_depend_on_the_unit(scale):
     for mesh, fits in ((plate(3.0), True), (plate(0.5), False)):
@@ -51,7 +54,8 @@ def test_the_faces_that_are_named_resolve_it():
     require_walls(sheet, int(named[1]))
     with pytest.raises(InputError):
         require_walls(sheet, int(named[1]) - 20)
-    simplified = simplify(Surface(sheet, Source("sheet", "0" * 64)), KitSpec(faces=int(named[1]))).mesh
+    spec = KitSpec(faces=int(named[1]), lloyd_iterations=1, newton_iterations=1)
+    simplified = simplify(Surface(sheet, Source("sheet", "0" * 64)), spec).mesh
     assert simplified.is_closed_manifold
 
 
@@ -61,11 +65,11 @@ def test_absurdly_many_faces_are_called_a_sheet():
 
 
 def test_what_is_thin_in_places_is_told_with_the_faces_that_help():
-    (note,) = require_walls(plate(1.0), 172)
+    (note,) = require_walls(plate(1.6), 172)
     found = re.match(r"(\d+) % of the surface .* (\d+) faces would resolve", note)
     assert found is not None
     assert int(found[1]) > 50
-    assert require_walls(plate(1.0), int(found[2])) == ()
+    assert require_walls(plate(1.6), int(found[2])) == ()
 
 
 def test_faces_and_edges_are_inverse():

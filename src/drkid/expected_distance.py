@@ -90,7 +90,7 @@ def faces_for_distance(surface: Surface, spec: KitSpec, mean_percent: float) -> 
                 remedy="a larger --for-distance-percent",
             )
         found = quick_distance(surface, spec, faces)
-    if best is None or found.mean_percent <= mean_percent and found.faces < best.faces:
+    if best is None or (found.mean_percent <= mean_percent and found.faces < best.faces):
         best = found
     return best
 

@@ -127,7 +127,7 @@ class KitSpec(BaseModel):
     max_genus: int | None = _field(
         None,
         "Input",
-        "Most handles that the surface may have: the smallest ones beyond are closed, filled or cut, and told; all are "
+        "Most handles that a volume's surface may have: the smallest beyond are closed and told; all are "
         "kept when not given.",
         ge=0,
     )

@@ -155,3 +155,10 @@ def test_points_and_senseless_coordinates_are_refused(potato, tmp_path):
 )
 def test_bad_meshes_from_the_wild_are_refused(name, words, shared_data):
     assert words in refusal(shared_data / "bad" / name)
+
+
+def test_handles_of_a_mesh_are_not_closed_and_that_is_said(ring, tmp_path):
+    trimesh.Trimesh(ring.vertices, ring.faces, process=False).export(tmp_path / "ring.ply")
+    with pytest.raises(InputError, match=r"cannot be closed.*genus 0 at most.*found: genus 1.*--max-genus 1"):
+        extract_surface(tmp_path / "ring.ply", KitSpec(max_genus=0))
+    assert extract_surface(tmp_path / "ring.ply", KitSpec(max_genus=1)).mesh.genus == 1

@@ -45,7 +45,8 @@ def surface_of_mesh_file(path: Path, spec: KitSpec, progress: Progress) -> Surfa
 
     Raises:
         SpecError: label, threshold or spacing is given, which are for volumes.
-        InputError: a mesh that cannot be read, or is empty, not finite, open, not manifold or not orientable.
+        InputError: a mesh that cannot be read, is empty, not finite, open, not manifold or not orientable, or has
+            more handles than `spec.max_genus`.
     """
     _refuse_volume_parameters(spec)
     suffix = checked_suffix(path, MESH_SUFFIXES)
@@ -58,6 +59,7 @@ def surface_of_mesh_file(path: Path, spec: KitSpec, progress: Progress) -> Surfa
     body = _oriented(body)
     _check(body, path.name)
     body, _ = outermost(body)
+    _require_few_handles(body, spec, path.name)
     progress("surface", 1.0)
     notes: tuple[str, ...] = ()
     if count > 1:
@@ -131,6 +133,16 @@ def _check(mesh: TriMesh, name: str) -> None:
     _refuse(mesh.pinched_vertices, "pinched vertices, at which parts touch in one point", name, "not manifold")
     altitude = 2 * mesh.areas / mesh.side_lengths.max(axis=1)
     _refuse(int((altitude < FLAT_DIAGONALS * mesh.diagonal).sum()), "faces without area", name, "degenerate")
+
+
+def _require_few_handles(mesh: TriMesh, spec: KitSpec, name: str) -> None:
+    if spec.max_genus is not None and mesh.genus > spec.max_genus:
+        raise InputError(
+            f"the handles of the mesh in {name} cannot be closed: that is done on voxels",
+            wanted=f"a surface of genus {spec.max_genus} at most (--max-genus)",
+            found=f"genus {mesh.genus}",
+            remedy=f"--max-genus {mesh.genus}, or the segmentation that the mesh was made of, as a volume",
+        )
 
 
 def _refuse(count: int, what: str, name: str, problem: str) -> None:
