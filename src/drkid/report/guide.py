@@ -135,7 +135,7 @@ def closing_text(guide: Guide) -> str:
     }.get(str(connector), "put glue on the sides of the gap and push the last piece down until it is flush")
     return (
         f"The last piece, number {last.step} ({last.part}), closes the shell. Its neighbours do not lean over it: it "
-        f"goes in from outside, straight down. Turn it until its ticks meet those of {joined_text(last)}; {means}."
+        f"goes in from outside, straight down. Join {joined_text(last)}: {means}."
     )
 
 
