@@ -165,7 +165,7 @@ class Builder:
         scene = self.guide.scene
         one = scene.document.pieces[piece]
         part = next(p for c in scene.document.classes for p in c.parts if p.file == one.part)
-        corners = np.array(part.corners) + [0, 0, float(scene.parts[one.part].vertices[:, 2].max())]
+        corners = np.array(part.corners) + np.array([0, 0, scene.parts[one.part].vertices[:, 2].max()])
         return corners @ scene.transforms[piece][:3, :3].T + scene.transforms[piece][:3, 3]
 
     def _label(self, piece: int, instruction: Instruction | None, corners: Floats) -> list[Shape | Word]:
@@ -223,7 +223,7 @@ def _towards(normal: Floats) -> list[tuple[float, float]]:
 
 def _seen_faces(flat: Floats, size: int) -> Ints:
     """The triangle (n, 3, 3) that each pixel sees, on a square picture about the origin, where there is one."""
-    faces, _, _ = rasterise(flat + [size / 2, size / 2, 0], size, size)
+    faces, _, _ = rasterise(flat + np.array([size / 2, size / 2, 0]), size, size)
     return faces[faces >= 0]
 
 

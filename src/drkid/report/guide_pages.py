@@ -30,6 +30,12 @@ class Page:
     text: str = ""
     parts: tuple[Drawing, ...] = ()
 
+    @property
+    def heading(self) -> str:
+        """Steps 1 to 15."""
+        first, last = self.steps[0].step, self.steps[-1].step
+        return f"Steps {first} to {last}" if first < last else f"Step {first}"
+
 
 def guide_pages(guide: Guide) -> tuple[list[Page], Page]:
     """The groups of steps, and the sheet that closes the shell, which carries the drawings of the parts."""
@@ -68,7 +74,9 @@ def part_lines(guide: Guide) -> list[PartLine]:
 def front_lines(guide: Guide) -> list[str]:
     """What to know before beginning."""
     document = guide.scene.document
-    items = [f"{item.count} × {_hardware(item.name, item.file, item.diameter, item.length)}" for item in document.hardware]
+    items = [
+        f"{item.count} × {_hardware(item.name, item.file, item.diameter, item.length)}" for item in document.hardware
+    ]
     also = f" and {', '.join(items)}" if items else ""
     return [
         f"{len(document.pieces)} pieces in {len(document.classes)} classes{also}; about "

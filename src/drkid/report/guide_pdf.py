@@ -95,8 +95,7 @@ def _parts(sheet: _Sheet, lines: list[PartLine], closing: Page) -> None:
 
 def _group(sheet: _Sheet, page: Page) -> None:
     steps = page.steps
-    head = f"Steps {steps[0].step} to {steps[-1].step}" if len(steps) > 1 else f"Step {steps[0].step}"
-    sheet.line(head, HEAD, font="Helvetica-Bold")
+    sheet.line(page.heading, HEAD, font="Helvetica-Bold")
     sheet.y -= 3
     _drawings(sheet, page)
     width = (WIDTH - 2 * MARGIN) / COLUMNS

@@ -13,7 +13,7 @@ from numba import njit
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from drkid.mesh import Floats, Ints
+from drkid.mesh import Bools, Floats, Ints
 
 MOST_HALVINGS = 6
 TOUCHING = 1e-6  # of the picture's size: layers that are nearer to one another touch, and either may be painted first
@@ -37,14 +37,15 @@ def painted(polygons: list[Floats], samples: int) -> Painted:
     Depth is compared on a grid with `samples` points along the picture's longer side.
     """
     source = np.arange(len(polygons))
-    for halvings in range(MOST_HALVINGS + 1):
-        behind, front, seen = _overlaps(polygons, samples)
+    behind, front, seen = _overlaps(polygons, samples)
+    for _ in range(MOST_HALVINGS):
         circular = _in_circles(len(polygons), behind, front)
-        if not circular.any() or halvings == MOST_HALVINGS:
+        if not circular.any():
             break
         parts = [_halved(p) if split else [p] for p, split in zip(polygons, circular, strict=True)]
         source = np.repeat(source, [len(part) for part in parts])
         polygons = [half for part in parts for half in part]
+        behind, front, seen = _overlaps(polygons, samples)
     order = [i for i in _sorted(polygons, behind, front) if seen[i]]
     return Painted(tuple(polygons[i] for i in order), source[order], seen[order])
 
@@ -129,7 +130,7 @@ def _layers(corners: Floats, owner: Ints, side: int, count: int, touching: float
     return pairs[:told], seen
 
 
-def _in_circles(count: int, behind: Ints, front: Ints) -> Ints:
+def _in_circles(count: int, behind: Ints, front: Ints) -> Bools:
     """Mask (count,): polygons that are, over others, in front of themselves."""
     graph = coo_array((np.ones(len(behind)), (behind, front)), shape=(count, count))
     label = connected_components(graph, directed=True, connection="strong")[1]
