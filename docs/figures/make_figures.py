@@ -2,7 +2,8 @@
 
     python docs/figures/make_figures.py [NAME ...]
 
-Needs the extra `figures` (matplotlib, playwright); `report` and `guide` need Chromium too. The nucleus is BSD-3-Clause, see src/drkid/data/README.md.
+Needs the extra `figures` (matplotlib, playwright); `report` and `guide` need Chromium too.
+The nucleus is BSD-3-Clause, see src/drkid/data/README.md.
 """
 
 import io

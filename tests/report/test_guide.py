@@ -29,7 +29,9 @@ def test_each_step_joins_all_neighbours_that_stand(guide, scene):
 
 
 def test_sides_that_meet_are_about_as_long_as_their_ticks_say(guide, scene):
-    lengths = [dict(zip(t, c.edge_lengths, strict=True)) for t, c in zip(guide.ticks, scene.document.classes, strict=True)]
+    lengths = [
+        dict(zip(t, c.edge_lengths, strict=True)) for t, c in zip(guide.ticks, scene.document.classes, strict=True)
+    ]
     longest = max(c.edge_lengths[-1] for c in scene.document.classes)
     piece_of = {int(step): i for i, step in enumerate(scene.piece_step)}
     for one in guide.instructions:
@@ -67,7 +69,7 @@ def test_the_page_opens_without_a_request(watched, documents, scene):
     assert watched.page.locator("svg").count() > len(scene.document.pieces) // STEPS_A_PICTURE
 
 
-def test_the_pdf_has_the_steps_in_few_pages(documents, scene, guide):
+def test_the_pdf_has_the_steps_in_few_pages(documents, guide):
     reader = PdfReader(io.BytesIO((documents / "guide.pdf").read_bytes()))
     text = "".join(page.extract_text() for page in reader.pages)
     assert len(reader.pages) <= len(guide.groups) + 4

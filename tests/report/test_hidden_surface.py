@@ -8,7 +8,9 @@ from drkid.report.hidden_surface import painted
 
 
 def square(x, y, z, half=1.0):
-    return np.array([[x - half, y - half, z], [x + half, y - half, z], [x + half, y + half, z], [x - half, y + half, z]])
+    return np.array(
+        [[x - half, y - half, z], [x + half, y - half, z], [x + half, y + half, z], [x - half, y + half, z]]
+    )
 
 
 def bar(a, b, width, z_a, z_b):

@@ -64,7 +64,18 @@ def test_figures_of_pieces_are_those_of_the_kit(scene):
 
 def test_render_writes_a_picture_and_says_what_colours_mean(kit_folder, tmp_path, capsys):
     path = tmp_path / "kit.png"
-    arguments = ["render", str(kit_folder), "--out", str(path), "--size", "120x80", "--colour", "error", "--view", "top"]
+    arguments = [
+        "render",
+        str(kit_folder),
+        "--out",
+        str(path),
+        "--size",
+        "120x80",
+        "--colour",
+        "error",
+        "--view",
+        "top",
+    ]
     assert run(arguments) == 0
     assert "% of the mean edge" in capsys.readouterr().out
     assert Image.open(path).size == (120, 80)
