@@ -2,10 +2,13 @@
 
     python docs/figures/make_figures.py [NAME ...]
 
-Needs the extra `figures` (matplotlib). The nucleus is BSD-3-Clause, see src/drkid/data/README.md.
+Needs the extra `figures` (matplotlib, playwright); `report` and `guide` need Chromium too.
+The nucleus is BSD-3-Clause, see src/drkid/data/README.md.
 """
 
+import io
 import json
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
@@ -20,7 +23,7 @@ import trimesh
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
-from render import Body, camera, colour, render
+from playwright.sync_api import Page, sync_playwright
 
 from drkid import Kit, KitSpec, make_kit
 from drkid.assembly import assemble
@@ -35,6 +38,8 @@ from drkid.congruence.target import Target
 from drkid.export.colour import CONNECTOR_COLOUR, class_colour
 from drkid.mesh import Bools, Floats, TriMesh
 from drkid.parts import make_parts
+from drkid.report.colouring import channels as colour
+from drkid.report.picture import Body, camera, render
 from drkid.solid import Solid
 
 HERE = Path(__file__).parent
@@ -89,6 +94,43 @@ def saved(name: str, picture: Floats) -> None:
 
 
 # ---- the figures
+
+
+def report() -> None:
+    """The report in a browser: moved apart, coloured by distance, one piece asked about."""
+
+    def act(page: Page) -> None:
+        page.fill("#explode", "35")
+        page.select_option("#colour", "distance")
+        box = page.locator("#view").bounding_box()
+        page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+
+    browsed("report.png", "report.html", (1100, 800), act)
+
+
+def guide() -> None:
+    """A group of steps of the guide."""
+
+    def act(page: Page) -> None:
+        page.locator("section").nth(6).scroll_into_view_if_needed()
+        page.evaluate("document.querySelectorAll('section')[6].scrollIntoView()")
+
+    browsed("guide.png", "guide.html", (900, 900), act)
+
+
+def browsed(name: str, document: str, size: tuple[int, int], act: Callable[[Page], None]) -> None:
+    """Save what headless Chromium shows of a document of the nucleus's kit after `act`."""
+    made = nucleus_kit()
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+        path = made.write(Path(folder) / "kit") / document
+        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+        page.goto(path.as_uri())
+        act(page)
+        page.wait_for_timeout(1500)
+        shot = page.screenshot()
+        browser.close()
+    saved(name, np.asarray(Image.open(io.BytesIO(shot)).convert("RGB")) / 255)
 
 
 def kit() -> None:
@@ -488,6 +530,8 @@ FUNCTIONS = (
     diffusion,
     fold,
     time_to_quality,
+    report,
+    guide,
 )
 FIGURES = {figure.__name__: figure for figure in FUNCTIONS}
 

@@ -294,7 +294,10 @@ def render(
         path.write_bytes(picture)
     except OSError as error:
         raise KitFolderError(
-            f"{path} cannot be written", wanted="a folder that exists", found=str(error.strerror), remedy="another --out"
+            f"{path} cannot be written",
+            wanted="a folder that exists",
+            found=str(error.strerror),
+            remedy="another --out",
         ) from error
     show_picture(path, legend)
     return 0

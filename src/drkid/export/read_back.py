@@ -44,5 +44,3 @@ def read_mesh(path: Path) -> trimesh.Trimesh:
 def broken_file(path: Path, wanted: str, found: str) -> KitFolderError:
     """The error for a file of a kit that is not as it was written."""
     return KitFolderError(f"{path} cannot be used", wanted=wanted, found=found, remedy="make the kit again")
-
-

@@ -6,22 +6,24 @@ from functools import cached_property
 import numpy as np
 
 from drkid.export.colour import class_colour
-from drkid.mesh import Floats, Ints
+from drkid.mesh import Bools, Floats, Ints
 from drkid.report.colouring import channels
 from drkid.report.drawing import Drawing, Shape, Word
 from drkid.report.guide import Guide, Instruction
-from drkid.report.hidden_surface import Painted, painted
+from drkid.report.hidden_surface import Painted, painted, triangulated
 from drkid.report.outline import outline
 from drkid.report.picture import camera
 from drkid.report.rasteriser import rasterise
 
 SAMPLES = 500  # along a picture, at which depth is compared: a third of a mm on paper
-COARSE = 160  # pixels along a picture by which a direction to look from is chosen
-FAIRLY_SEEN = 0.3  # of a piece's own largest face: less, and the piece needs another picture
-MOST_VIEWS = 3  # of one group
+COARSE = 120  # pixels along a picture by which a direction to look from is chosen
+FAIRLY_SEEN = 0.4  # of a piece's outer face: less, and the piece needs another picture
+MOST_VIEWS = 4  # of one group
 LEAST_FACING = 0.3  # cosine to the eye below which a face is too oblique for words
 STANDING, STANDING_LINE, NEW_LINE = "#E4E6EA", "#8A8F99", "#000000"
-DIRECTIONS = [(a, e) for e in (-65, -30, 0, 30, 65) for a in range(0, 360, 36)]
+OUTER_COSINE = 0.99  # to the piece's normal: faces that are more oblique are its sides
+STEEPEST = 80.0  # degrees of elevation
+DIRECTIONS = [(float(a), float(e)) for e in (-60, -20, 20, 60) for a in range(0, 360, 45)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,24 +49,34 @@ class Builder:
     def _placed(self) -> list[list[Floats]]:
         return [self._polygons(i) for i in range(len(self.guide.scene.document.pieces))]
 
+    @cached_property
+    def _fans(self) -> tuple[Floats, Ints, Bools]:
+        """(n, 3, 3): every piece's triangles in world coordinates, whose they are, and which are of an outer face."""
+        corners, polygon = triangulated([p for polygons in self._placed for p in polygons])
+        piece = np.repeat(np.arange(len(self._placed)), [len(polygons) for polygons in self._placed])[polygon]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        outwards = np.einsum("nk,nk->n", normal, self.guide.scene.transforms[piece][:, :3, 2])
+        return corners, piece, outwards > OUTER_COSINE * np.linalg.norm(normal, axis=1)
+
+    @cached_property
+    def _outer_area(self) -> Floats:
+        """(P,): area of each piece's outer face."""
+        corners, piece, outer = self._fans
+        area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+        return np.bincount(piece[outer], weights=area[outer], minlength=len(self._placed))
+
     # ---- where to look from
 
-    def views(self, group: tuple[Instruction, ...]) -> list[tuple[Floats, set[int]]]:
-        """Cameras from which every new piece of the group is fairly seen, most of them in the first; what each shows.
+    def views(self, group: tuple[Instruction, ...]) -> list[Floats]:
+        """Cameras from which every new piece of the group is fairly seen, most of them in the first.
 
-        Greedy set cover; a piece that no direction shows well is left to the first picture.
+        Greedy set cover; a piece that no direction shows well is left to the others' pictures.
         """
         new = [one.piece for one in group]
-        standing = [one.piece for one in self.guide.instructions[: group[-1].step]]
-        normals = self.guide.scene.transforms[new][:, :3, 2]
-        mean = normals.mean(axis=0)
-        candidates = [camera(a, e) for a, e in DIRECTIONS]
-        if np.linalg.norm(mean) > 0.1:
-            eye = mean / np.linalg.norm(mean)
-            angles = np.degrees([np.arctan2(eye[1], eye[0]), np.arcsin(np.clip(eye[2], -1, 1))])
-            candidates.insert(0, camera(float(angles[0]), float(np.clip(angles[1], -80, 80))))
-        shares = np.array([self._seen(standing, new, view) for view in candidates])
-        left, found = set(range(len(new))), list[tuple[Floats, set[int]]]()
+        standing = np.array([one.piece for one in self.guide.instructions[: group[-1].step]])
+        candidates = [*_towards(self.guide.scene.transforms[new][:, :3, 2].mean(axis=0)), *DIRECTIONS]
+        shares = np.array([self._seen(standing, new, camera(*one)) for one in candidates])
+        left, found = set(range(len(new))), list[Floats]()
         while left and len(found) < MOST_VIEWS:
             rest = sorted(left)
             gains = (shares[:, rest] > FAIRLY_SEEN).sum(axis=1) + np.minimum(shares[:, rest], 1).mean(axis=1)
@@ -72,26 +84,19 @@ class Builder:
             shown = {i for i in rest if shares[best, i] > FAIRLY_SEEN}
             if not shown and found:
                 break
-            found.append((candidates[best], {new[i] for i in shown}))
+            found.append(camera(*candidates[best]))
             left -= shown
         return found
 
-    def _seen(self, standing: list[int], new: list[int], view: Floats) -> Floats:
-        """(n,): the visible area of each new piece over that of its largest face."""
+    def _seen(self, standing: Ints, new: list[int], view: Floats) -> Floats:
+        """(n,): the visible area of each new piece's outer face over the whole of it."""
+        corners, piece, outer = self._fans
         scale = COARSE / (2.2 * self._size)
-        corners, owner = self._triangles(standing)
-        flat = (corners - self.guide.scene.middle) @ view.T * [scale, -scale, scale] + [COARSE / 2, COARSE / 2, 0]
-        faces, _, _ = rasterise(flat, COARSE, COARSE)
-        count = np.bincount(owner[faces[faces >= 0]], minlength=len(self._placed))
-        areas = np.array([self._largest_face(i) for i in new]) * scale**2
-        return count[new] / areas
-
-    def _triangles(self, pieces: list[int]) -> tuple[Floats, Ints]:
-        fans = [[p[[0, k, k + 1]] for p in self._placed[i] for k in range(1, len(p) - 1)] for i in pieces]
-        return np.array([t for fan in fans for t in fan]), np.repeat(pieces, [len(fan) for fan in fans])
-
-    def _largest_face(self, piece: int) -> float:
-        return max(_area(p) for p in self._placed[piece])
+        used = np.flatnonzero(np.isin(piece, standing))
+        flat = (corners[used] - self.guide.scene.middle) @ view.T * [scale, -scale, scale]
+        faces = used[_seen_faces(flat, COARSE)]
+        count = np.bincount(piece[faces[outer[faces]]], minlength=len(self._placed))
+        return count[new] / (self._outer_area[new] * scale**2)
 
     # ---- drawing
 
@@ -134,10 +139,11 @@ class Builder:
         placing: tuple[float, Floats],
     ) -> list[Shape | Word]:
         scene, (scale, shift) = self.guide.scene, placing
-        corners, owner = self._triangles(standing)
+        corners, owner, _ = self._fans
+        used = np.flatnonzero(np.isin(owner, standing))
         samples = SAMPLES / (2.2 * self._size)
         middle = np.array([SAMPLES / 2, SAMPLES / 2, 0])
-        screen = (corners - scene.middle) @ view.T * [samples, -samples, samples] + middle
+        screen = (corners[used] - scene.middle) @ view.T * [samples, -samples, samples] + middle
         faces, _, _ = rasterise(screen, SAMPLES, SAMPLES)
         items: list[Shape | Word] = []
         for piece in standing:
@@ -148,7 +154,7 @@ class Builder:
             flat = (top - scene.middle) @ view.T
             x, y = (flat.mean(axis=0) * [samples, -samples, 1] + middle)[:2].astype(int)
             facing = float(scene.transforms[piece][:3, 2] @ view[2])
-            if facing < LEAST_FACING or faces[y, x] < 0 or owner[faces[y, x]] != piece:
+            if facing < LEAST_FACING or faces[y, x] < 0 or owner[used[faces[y, x]]] != piece:
                 continue
             on_paper = flat[:, :2] * scale + shift
             items += self._label(piece, new.get(piece), on_paper)
@@ -159,7 +165,7 @@ class Builder:
         scene = self.guide.scene
         one = scene.document.pieces[piece]
         part = next(p for c in scene.document.classes for p in c.parts if p.file == one.part)
-        corners = np.array(part.corners) + [0, 0, float(scene.parts[one.part].vertices[:, 2].max())]
+        corners = np.array(part.corners) + np.array([0, 0, scene.parts[one.part].vertices[:, 2].max()])
         return corners @ scene.transforms[piece][:3, :3].T + scene.transforms[piece][:3, 3]
 
     def _label(self, piece: int, instruction: Instruction | None, corners: Floats) -> list[Shape | Word]:
@@ -170,9 +176,9 @@ class Builder:
             return [Word(middle[0], middle[1], step, 0.85 * size, colour="#333333")]
         letter = instruction.part.replace(" left", " L").replace(" right", " R")
         return [
-            Word(middle[0], middle[1] + 0.5 * size, step, size, True, "#000000", "#FFFFFF"),
-            Word(middle[0], middle[1] - 0.6 * size, letter, 0.8 * size, False, "#000000", "#FFFFFF"),
-            *ticks(corners, self.guide.part_ticks[self.guide.scene.document.pieces[piece].part], size / 3),
+            *ticks(corners, self.guide.part_ticks[self.guide.scene.document.pieces[piece].part], 0.75 * size),
+            Word(middle[0], middle[1] + 0.45 * size, step, size, True, "#000000", "#FFFFFF"),
+            Word(middle[0], middle[1] - 0.5 * size, letter, 0.75 * size, False, "#000000", "#FFFFFF"),
         ]
 
     def part_drawing(self, file: str, width: float) -> Drawing:
@@ -186,7 +192,7 @@ class Builder:
         items = (
             Shape(flat, class_colour(number), NEW_LINE, 0.35),
             Word(middle[0], middle[1], classes[number].id, size, True, "#000000", "#FFFFFF"),
-            *ticks(flat, self.guide.part_ticks[file], width / 22),
+            *ticks(flat, self.guide.part_ticks[file], width / 9),
         )
         name = self.guide.part_names[file]
         return Drawing(width, float(flat[:, 1].max()) + 1, items, f"Outer face of a piece {name}")
@@ -197,18 +203,28 @@ def ticks(corners: Floats, counts: tuple[int, ...], length: float) -> list[Shape
     middle, found = corners.mean(axis=0), list[Shape]()
     for a, b, count in zip(corners, np.roll(corners, -1, axis=0), counts, strict=True):
         along = (b - a) / max(float(np.linalg.norm(b - a)), 1e-9)
-        at = 0.86 * (a + b) / 2 + 0.14 * middle
+        at = 0.82 * (a + b) / 2 + 0.18 * middle
         inward = (middle - (a + b) / 2) / max(float(np.linalg.norm(middle - (a + b) / 2)), 1e-9)
         for k in range(count):
-            foot = at + along * (k - (count - 1) / 2) * 0.7 * length
+            foot = at + along * (k - (count - 1) / 2) * 0.45 * length
             line = np.stack([foot - inward * length / 2, foot + inward * length / 2])
-            found += [Shape(line, None, "#FFFFFF", 0.3 * length), Shape(line, None, "#000000", 0.16 * length)]
+            found += [Shape(line, None, "#FFFFFF", 0.34 * length), Shape(line, None, "#000000", 0.17 * length)]
     return found
 
 
-def _area(polygon: Floats) -> float:
-    following = np.roll(polygon, -1, axis=0)
-    return float(np.linalg.norm(np.cross(polygon, following).sum(axis=0)) / 2)
+def _towards(normal: Floats) -> list[tuple[float, float]]:
+    """Azimuth and elevation from which a normal is seen, not quite from above or below; none where it is zero."""
+    length = float(np.linalg.norm(normal))
+    if length < 0.1:
+        return []
+    azimuth, elevation = np.arctan2(normal[1], normal[0]), np.arcsin(np.clip(normal[2] / length, -1, 1))
+    return [(float(np.degrees(azimuth)), float(np.clip(np.degrees(elevation), -STEEPEST, STEEPEST)))]
+
+
+def _seen_faces(flat: Floats, size: int) -> Ints:
+    """The triangle (n, 3, 3) that each pixel sees, on a square picture about the origin, where there is one."""
+    faces, _, _ = rasterise(flat + np.array([size / 2, size / 2, 0]), size, size)
+    return faces[faces >= 0]
 
 
 def _signed_area(polygon: Floats) -> float:

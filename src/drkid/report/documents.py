@@ -13,6 +13,7 @@ from drkid.report.guide_pdf import guide_pdf
 from drkid.report.report import report_html
 from drkid.report.scene import scene_of
 
+
 def _guide(kit: Kit) -> dict[str, bytes]:
     guide = Guide(scene_of(kit))
     pages, closing = guide_pages(guide)

@@ -1,6 +1,7 @@
 """Drawings of flat shapes and words in mm, as SVG and on a PDF page."""
 
 from dataclasses import dataclass
+from functools import cache
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -91,11 +92,16 @@ def _pdf_shape(canvas: "Canvas", item: Shape) -> None:
         path.lineTo(*point)
     if item.fill is not None:
         path.close()
-        canvas.setFillColor(item.fill)
+        canvas.setFillColorRGB(*_channels(item.fill))
     if item.stroke is not None:
-        canvas.setStrokeColor(item.stroke)
+        canvas.setStrokeColorRGB(*_channels(item.stroke))
         canvas.setLineWidth(item.width)
     canvas.drawPath(path, stroke=int(item.stroke is not None), fill=int(item.fill is not None))
+
+
+@cache
+def _channels(code: str) -> tuple[float, float, float]:
+    return int(code[1:3], 16) / 255, int(code[3:5], 16) / 255, int(code[5:7], 16) / 255
 
 
 def _pdf_word(canvas: "Canvas", item: Word) -> None:

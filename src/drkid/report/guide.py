@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -39,7 +40,7 @@ class Guide:
 
     @cached_property
     def ticks(self) -> tuple[tuple[int, ...], ...]:
-        """For each class the ticks of its sides, ascending: 1 for the shortest length, 2 for the next, …"""
+        """For each class the ticks of its sides, ascending: 1 for the shortest length, 2 for the next."""
         return tuple(ranks(np.array(one.edge_lengths)) for one in self.scene.document.classes)
 
     @cached_property
@@ -100,7 +101,7 @@ class Guide:
         """Steps that one picture shows, about equally many in each."""
         count = -(-len(self.instructions) // STEPS_A_PICTURE)
         ends = np.round(np.linspace(0, len(self.instructions), count + 1)).astype(int).tolist()
-        return tuple(self.instructions[a:b] for a, b in zip(ends[:-1], ends[1:], strict=True))
+        return tuple(self.instructions[a:b] for a, b in pairwise(ends))
 
 
 def ranks(ascending: Floats) -> tuple[int, ...]:
@@ -135,7 +136,7 @@ def closing_text(guide: Guide) -> str:
     }.get(str(connector), "put glue on the sides of the gap and push the last piece down until it is flush")
     return (
         f"The last piece, number {last.step} ({last.part}), closes the shell. Its neighbours do not lean over it: it "
-        f"goes in from outside, straight down. Turn it until its ticks meet those of {joined_text(last)}; {means}."
+        f"goes in from outside, straight down. Join {joined_text(last)}: {means}."
     )
 
 

@@ -42,10 +42,8 @@ def _sides(sides: tuple[tuple[int, float], ...]) -> str:
 
 
 def _group(page: Page) -> str:
-    steps = page.steps
-    head = f"Steps {steps[0].step} to {steps[-1].step}" if len(steps) > 1 else f"Step {steps[0].step}"
-    items = "".join(f"<li>{_step(step)}</li>" for step in steps)
-    return f'<section><h2>{head}</h2>{_figure(page)}<ol class="steps">{items}</ol></section>'
+    items = "".join(f"<li>{_step(step)}</li>" for step in page.steps)
+    return f'<section><h2>{page.heading}</h2>{_figure(page)}<ol class="steps">{items}</ol></section>'
 
 
 def _step(step: Instruction) -> str:

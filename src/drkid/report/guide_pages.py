@@ -6,7 +6,8 @@ from drkid.report.building_picture import Builder
 from drkid.report.drawing import Drawing
 from drkid.report.guide import Guide, Instruction, closing_text, joining_text
 
-SHEET_MM = (180.0, 150.0)  # room for the pictures of a group on A4
+SHEET_MM = (180.0, 180.0)  # room for the pictures of a group on A4
+GAP_MM = 5.0  # between pictures
 PART_MM = 28.0  # width of a part in the table of classes
 
 
@@ -29,22 +30,30 @@ class Page:
     text: str = ""
     parts: tuple[Drawing, ...] = ()
 
+    @property
+    def heading(self) -> str:
+        """Steps 1 to 15."""
+        first, last = self.steps[0].step, self.steps[-1].step
+        return f"Steps {first} to {last}" if first < last else f"Step {first}"
+
 
 def guide_pages(guide: Guide) -> tuple[list[Page], Page]:
     """The groups of steps, and the sheet that closes the shell, which carries the drawings of the parts."""
     builder = Builder(guide)
     pages = [_page(builder, group) for group in guide.groups]
     last = guide.instructions[-1:]
-    view = builder.views(last)[0][0]
+    view = builder.views(last)[0]
     parts = tuple(builder.part_drawing(file, PART_MM) for file in guide.part_names)
     return pages, Page(last, (builder.drawing(last, view, *SHEET_MM),), closing_text(guide), parts)
 
 
 def _page(builder: Builder, group: tuple[Instruction, ...]) -> Page:
     """One large picture, or a few smaller ones where no direction shows all new pieces."""
-    views = [view for view, _ in builder.views(group)]
+    views = builder.views(group)
     width, height = SHEET_MM
-    size = (width, height) if len(views) == 1 else (width / 2 - 3, height) if len(views) == 2 else (width / 2 - 3, 73.0)
+    columns = 1 if len(views) == 1 else 2
+    rows = -(-len(views) // columns)
+    size = (width - GAP_MM * (columns - 1)) / columns, (height - GAP_MM * (rows - 1)) / rows
     return Page(group, tuple(builder.drawing(group, view, *size) for view in views))
 
 
@@ -65,7 +74,9 @@ def part_lines(guide: Guide) -> list[PartLine]:
 def front_lines(guide: Guide) -> list[str]:
     """What to know before beginning."""
     document = guide.scene.document
-    items = [f"{item.count} × {_hardware(item.name, item.file, item.diameter, item.length)}" for item in document.hardware]
+    items = [
+        f"{item.count} × {_hardware(item.name, item.file, item.diameter, item.length)}" for item in document.hardware
+    ]
     also = f" and {', '.join(items)}" if items else ""
     return [
         f"{len(document.pieces)} pieces in {len(document.classes)} classes{also}; about "

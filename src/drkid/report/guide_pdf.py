@@ -7,12 +7,11 @@ from reportlab.pdfgen.canvas import Canvas
 
 from drkid.report.drawing import POINT, draw_on
 from drkid.report.guide import Guide, joined_text, tick_word
-from drkid.report.guide_pages import Page, PartLine, front_lines, part_lines
+from drkid.report.guide_pages import GAP_MM, Page, PartLine, front_lines, part_lines
 
 WIDTH, HEIGHT, MARGIN = 210.0, 297.0, 15.0  # mm: A4
 TEXT, SMALL, HEAD = 10.0, 8.5, 15.0  # points
 LEADING = 1.3  # of the letters' size
-GAP = 5.0  # mm between pictures
 COLUMNS = 2  # of steps
 
 
@@ -96,8 +95,7 @@ def _parts(sheet: _Sheet, lines: list[PartLine], closing: Page) -> None:
 
 def _group(sheet: _Sheet, page: Page) -> None:
     steps = page.steps
-    head = f"Steps {steps[0].step} to {steps[-1].step}" if len(steps) > 1 else f"Step {steps[0].step}"
-    sheet.line(head, HEAD, font="Helvetica-Bold")
+    sheet.line(page.heading, HEAD, font="Helvetica-Bold")
     sheet.y -= 3
     _drawings(sheet, page)
     width = (WIDTH - 2 * MARGIN) / COLUMNS
@@ -118,14 +116,14 @@ def _drawings(sheet: _Sheet, page: Page) -> None:
     """In rows, as many in each as there is room for, in the middle."""
     rows: list[list[int]] = [[]]
     for i, drawing in enumerate(page.drawings):
-        used = sum(page.drawings[j].width + GAP for j in rows[-1])
+        used = sum(page.drawings[j].width + GAP_MM for j in rows[-1])
         if rows[-1] and used + drawing.width > WIDTH - 2 * MARGIN + 1:
             rows.append([])
         rows[-1].append(i)
     for row in rows:
         drawings = [page.drawings[i] for i in row]
-        tallest, x = max(d.height for d in drawings), (WIDTH - sum(d.width + GAP for d in drawings) + GAP) / 2
+        tallest, x = max(d.height for d in drawings), (WIDTH - sum(d.width + GAP_MM for d in drawings) + GAP_MM) / 2
         for drawing in drawings:
             draw_on(sheet.canvas, drawing, x, sheet.y - (tallest + drawing.height) / 2)
-            x += drawing.width + GAP
-        sheet.y -= tallest + GAP
+            x += drawing.width + GAP_MM
+        sheet.y -= tallest + GAP_MM

@@ -13,7 +13,7 @@ from numba import njit
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from drkid.mesh import Floats, Ints
+from drkid.mesh import Bools, Floats, Ints
 
 MOST_HALVINGS = 6
 TOUCHING = 1e-6  # of the picture's size: layers that are nearer to one another touch, and either may be painted first
@@ -37,14 +37,15 @@ def painted(polygons: list[Floats], samples: int) -> Painted:
     Depth is compared on a grid with `samples` points along the picture's longer side.
     """
     source = np.arange(len(polygons))
-    for halvings in range(MOST_HALVINGS + 1):
-        behind, front, seen = _overlaps(polygons, samples)
+    behind, front, seen = _overlaps(polygons, samples)
+    for _ in range(MOST_HALVINGS):
         circular = _in_circles(len(polygons), behind, front)
-        if not circular.any() or halvings == MOST_HALVINGS:
+        if not circular.any():
             break
         parts = [_halved(p) if split else [p] for p, split in zip(polygons, circular, strict=True)]
         source = np.repeat(source, [len(part) for part in parts])
         polygons = [half for part in parts for half in part]
+        behind, front, seen = _overlaps(polygons, samples)
     order = [i for i in _sorted(polygons, behind, front) if seen[i]]
     return Painted(tuple(polygons[i] for i in order), source[order], seen[order])
 
@@ -65,27 +66,29 @@ def _overlaps(polygons: list[Floats], samples: int) -> tuple[Ints, Ints, Ints]:
     """Pairs (behind, in front) that follow one another at a sample, each once; and samples at which each is seen."""
     points = np.concatenate(polygons)
     low, size = points.min(axis=0), max(float(np.ptp(points[:, :2], axis=0).max()), 1e-9)
-    corners = [p[[0, i, i + 1]] for p in polygons for i in range(1, len(p) - 1)]
-    owner = np.repeat(np.arange(len(polygons)), [len(p) - 2 for p in polygons])
-    cell, which, depth = _layers((np.stack(corners) - low) * (samples / size), owner, samples + 1)
-    order = np.lexsort((depth, cell))
-    cell, which, depth = cell[order], which[order], depth[order]
-    same = cell[1:] == cell[:-1]
-    apart = same & (which[1:] != which[:-1]) & (np.diff(depth) > TOUCHING * samples)
-    pairs = np.unique(np.stack([which[:-1][apart], which[1:][apart]], axis=1), axis=0)
-    top = which[np.append(~same, True)] if len(cell) else which
-    return pairs[:, 0], pairs[:, 1], np.bincount(top, minlength=len(polygons)).astype(np.int64)
+    corners, owner = triangulated(polygons)
+    pairs, seen = _layers((corners - low) * (samples / size), owner, samples + 1, len(polygons), TOUCHING * samples)
+    keys = np.unique(pairs)
+    return keys // len(polygons), keys % len(polygons), seen
+
+
+def triangulated(polygons: list[Floats]) -> tuple[Floats, Ints]:
+    """(n, 3, 3): convex polygons as fans of triangles, and the polygon (n,) that each is of."""
+    sizes = np.array([len(p) for p in polygons])
+    first = np.repeat(np.cumsum(sizes) - sizes, sizes - 2)
+    owner = np.repeat(np.arange(len(polygons)), sizes - 2)
+    fan = np.arange(len(owner)) - np.repeat(np.cumsum(sizes - 2) - (sizes - 2), sizes - 2) + 1
+    return np.concatenate(polygons)[np.stack([first, first + fan, first + fan + 1], axis=1)], owner
 
 
 @njit(cache=True)
-def _layers(corners: Floats, owner: Ints, side: int) -> tuple[Ints, Ints, Floats]:
-    # Every triangle that covers a sample: the sample's number, the triangle's owner and its depth there.
-    total = 0
+def _layers(corners: Floats, owner: Ints, side: int, count: int, touching: float) -> tuple[Ints, Ints]:
+    # All layers at every sample, sorted by depth: pairs that follow one another, as behind * count + front, and how
+    # often each of `count` polygons is the nearest. A pair that was met just before is not told again.
+    start = np.zeros(side * side + 1, np.int64)
+    which, depth = np.empty(0, np.int64), np.empty(0)
     for writing in range(2):
-        if writing:
-            cell, which = np.empty(total, np.int64), np.empty(total, np.int64)
-            depth = np.empty(total)
-        n = 0
+        filled = start[:-1].copy()
         for f in range(len(corners)):
             a, b, c = corners[f, 0], corners[f, 1], corners[f, 2]
             area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
@@ -100,15 +103,34 @@ def _layers(corners: Floats, owner: Ints, side: int) -> tuple[Ints, Ints, Floats
                     v = ((c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)) / area
                     if u < 0 or v < 0 or u + v > 1:
                         continue
-                    if writing:
-                        cell[n], which[n] = row * side + column, owner[f]
-                        depth[n] = u * a[2] + v * b[2] + (1 - u - v) * c[2]
-                    n += 1
-        total = n
-    return cell, which, depth
+                    cell = row * side + column
+                    if not writing:
+                        start[cell + 1] += 1
+                        continue
+                    z, at = u * a[2] + v * b[2] + (1 - u - v) * c[2], filled[cell]
+                    while at > start[cell] and depth[at - 1] > z:
+                        depth[at], which[at] = depth[at - 1], which[at - 1]
+                        at -= 1
+                    depth[at], which[at] = z, owner[f]
+                    filled[cell] += 1
+        if not writing:
+            start = np.cumsum(start)
+            which, depth = np.empty(start[-1], np.int64), np.empty(start[-1])
+    pairs, told = np.empty(len(which), np.int64), 0
+    last, seen = np.full(count, -1), np.zeros(count, np.int64)
+    for cell in range(side * side):
+        for at in range(start[cell], start[cell + 1] - 1):
+            a, b = which[at], which[at + 1]
+            if a != b and depth[at + 1] - depth[at] > touching and last[a] != b:
+                last[a] = b
+                pairs[told] = a * count + b
+                told += 1
+        if start[cell + 1] > start[cell]:
+            seen[which[start[cell + 1] - 1]] += 1
+    return pairs[:told], seen
 
 
-def _in_circles(count: int, behind: Ints, front: Ints) -> Ints:
+def _in_circles(count: int, behind: Ints, front: Ints) -> Bools:
     """Mask (count,): polygons that are, over others, in front of themselves."""
     graph = coo_array((np.ones(len(behind)), (behind, front)), shape=(count, count))
     label = connected_components(graph, directed=True, connection="strong")[1]

@@ -19,7 +19,7 @@ TILT_DEGREES = 30.0  # of the broad side's view, so that it is seen a little fro
 MOST_PIXELS = 8000  # a side of a picture
 
 
-def draw_kit(  # noqa: PLR0913 — a picture has that many sides
+def draw_kit(
     folder: Path,
     *,
     view: str = "broad",
@@ -46,7 +46,7 @@ def draw_kit(  # noqa: PLR0913 — a picture has that many sides
     return png_bytes(picture), legend
 
 
-def kit_picture(  # noqa: PLR0913 — a picture has that many sides
+def kit_picture(
     scene: Scene,
     view: Floats,
     width: int,

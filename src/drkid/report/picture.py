@@ -42,7 +42,7 @@ def camera(azimuth_degrees: float, elevation_degrees: float, roll_degrees: float
     return np.stack([np.cos(roll) * right + np.sin(roll) * up, np.cos(roll) * up - np.sin(roll) * right, eye])
 
 
-def render(  # noqa: PLR0913 — a picture has that many sides
+def render(
     bodies: Sequence[Body],
     view: Floats,
     width: int,
@@ -60,9 +60,9 @@ def render(  # noqa: PLR0913 — a picture has that many sides
     everything = np.concatenate([mesh.corners for mesh in shown]) @ view.T
     low, high = everything.reshape(-1, 3).min(axis=0), everything.reshape(-1, 3).max(axis=0)
     extents = np.maximum(high - low, 1e-9)
-    if scale is None:
-        scale = width * (1 - 2 * MARGIN) / extents[0]
-        scale = scale if height is None else min(scale, (height - 2 * MARGIN * width) / extents[1])
+    fitting = width * (1 - 2 * MARGIN) / extents[0]
+    fitting = fitting if height is None else min(fitting, (height - 2 * MARGIN * width) / extents[1])
+    scale = float(fitting) if scale is None else scale
     height = int(np.ceil(scale * extents[1] + 2 * MARGIN * width)) if height is None else height
     fine = OVERSAMPLING * scale
     size = np.array([width, height]) * OVERSAMPLING
@@ -124,7 +124,9 @@ def _hollows(depth: Floats, faces: Ints, size: float) -> Floats:
     total = np.zeros_like(filled)
     for share in HOLLOWS:
         sigma = share * size / OVERSAMPLING
-        around = gaussian_filter(filled, sigma, truncate=2.5) / np.maximum(gaussian_filter(seen, sigma, truncate=2.5), 1e-3)
+        around = gaussian_filter(filled, sigma, truncate=2.5) / np.maximum(
+            gaussian_filter(seen, sigma, truncate=2.5), 1e-3
+        )
         total += np.clip((around - here) / (3 * sigma * OVERSAMPLING), 0, 1) / len(HOLLOWS)
     shadow = np.where(seen > 0, np.minimum(1.6 * total, 1), 0.0)
     return np.kron(shadow, np.ones((OVERSAMPLING, OVERSAMPLING)))
@@ -133,7 +135,7 @@ def _hollows(depth: Floats, faces: Ints, size: float) -> Floats:
 def _averaged(fine: Floats) -> Floats:
     """(height, width, …): the means over the fine pixels of each pixel."""
     height, width = fine.shape[0] // OVERSAMPLING, fine.shape[1] // OVERSAMPLING
-    return fine.reshape(height, OVERSAMPLING, width, OVERSAMPLING, *fine.shape[2:]).mean(axis=(1, 3))
+    return fine.reshape(height, OVERSAMPLING, width, OVERSAMPLING, *fine.shape[2:]).mean(axis=(1, 3), dtype=np.float64)
 
 
 def _lines(bodies: Sequence[Body], view: Floats, faces: Ints) -> Bools:

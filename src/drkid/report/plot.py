@@ -11,9 +11,7 @@ WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 900, 300, 70, 12, 14, 40
 LEAST_POSITIVE = 1e-15  # of a logarithmic axis, in percent: below the last bit of a length
 
 
-def lines(
-    x: Floats, series: dict[str, Floats], labels: tuple[str, str], limit: tuple[str, float] | None = None
-) -> str:
+def lines(x: Floats, series: dict[str, Floats], labels: tuple[str, str], limit: tuple[str, float] | None = None) -> str:
     """Series over `x` on a logarithmic axis, each named; `limit` is drawn across, dashed."""
     every = [np.maximum(y, LEAST_POSITIVE) for y in series.values()]
     known = np.concatenate([*every, [] if limit is None else [limit[1]]])
@@ -62,9 +60,7 @@ def bars(values: Floats, colours: Sequence[str], names: Sequence[str], labels: t
         )
     mean = TOP + high * (1 - float(values.mean()) / top)
     parts.append(f'<path class="axis" stroke-dasharray="6 3" d="M{LEFT} {mean:.2f}H{WIDTH - RIGHT}"/>')
-    parts.append(
-        f'<text x="{WIDTH - RIGHT}" y="{mean - 4:.2f}" text-anchor="end">mean {values.mean():.3g}</text>'
-    )
+    parts.append(f'<text x="{WIDTH - RIGHT}" y="{mean - 4:.2f}" text-anchor="end">mean {values.mean():.3g}</text>')
     parts.append(f'<text x="{LEFT}" y="{HEIGHT - BOTTOM + 16}">1</text>')
     parts.append(f'<text x="{WIDTH - RIGHT}" y="{HEIGHT - BOTTOM + 16}" text-anchor="end">{len(values)}</text>')
     return _framed(parts, labels)

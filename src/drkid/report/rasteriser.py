@@ -5,6 +5,7 @@ from numba import njit
 
 from drkid.mesh import Floats, Ints
 
+
 @njit(cache=True)
 def rasterise(corners: Floats, width: int, height: int) -> tuple[Ints, Floats, Floats]:
     """Nearest triangle (height, width), its depth and its barycentric coordinates at each pixel's middle; -1: none.

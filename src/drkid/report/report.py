@@ -31,7 +31,8 @@ def report_html(scene: Scene, parts_list: list[Row]) -> str:
     moulds = f"{metrics.unique_piece_parts} mould{'s' if metrics.unique_piece_parts > 1 else ''}"
     summary = (
         f"{pieces} pieces in {metrics.classes} classes from {moulds}, made of {document.source.name}; "
-        f"{' × '.join(f'{x:.0f}' for x in scene.assembled.extents)} mm. {document.outcome.message}"
+        f"{' × '.join(f'{x:.0f}' for x in scene.assembled.extents)} mm. "
+        f"Solver: {document.outcome.message}."
     )
     return Template(_page("report.html")).substitute(
         title=escape(f"Kit of {document.source.name}"),

@@ -1,4 +1,4 @@
-"""Scene: a kit as documents see it, from a `Kit` or from a kit folder; what is drawn, and what is told of each piece."""
+"""Scene: a kit as its documents see it, from a `Kit` or a kit folder; what is drawn and told of each piece."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -130,4 +130,4 @@ def _mesh(path: Path) -> TriMesh:
 
 
 def _sides(corners: Floats) -> Floats:
-    return np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
+    return np.asarray(np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1), np.float64)

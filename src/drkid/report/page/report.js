@@ -60,11 +60,13 @@
     camera.add(sun);
     scene.add(camera);
     kit.parts.forEach((part, number) => {
-      const geometry = new T.BufferGeometry();
-      geometry.setAttribute("position", new T.BufferAttribute(floats(part.vertices), 3));
-      geometry.setIndex(new T.BufferAttribute(indices(part.faces), 1));
+      const shared = new T.BufferGeometry();
+      shared.setAttribute("position", new T.BufferAttribute(floats(part.vertices), 3));
+      shared.setIndex(new T.BufferAttribute(indices(part.faces), 1));
+      const geometry = shared.toNonIndexed(); // each face has its own normal
+      geometry.computeVertexNormals();
       const own = kit.pieces.map((_, i) => i).filter((i) => kit.pieces[i].part === number);
-      const mesh = new T.InstancedMesh(geometry, new T.MeshLambertMaterial({ flatShading: true, side: T.DoubleSide }), own.length);
+      const mesh = new T.InstancedMesh(geometry, new T.MeshLambertMaterial({}), own.length);
       mesh.frustumCulled = false;
       mesh.userData.pieces = own;
       own.forEach((i, n) => { place[i] = [mesh, n]; });
