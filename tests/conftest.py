@@ -67,7 +67,7 @@ def potato_file(potato, tmp_path_factory) -> Path:
 @pytest.fixture(scope="session")
 def kit(potato_file) -> Kit:
     """A small kit of the potato: 60 pieces in four classes, by the solver that is the quicker one here."""
-    spec = KitSpec(method="pressure", faces=60, classes=4, tolerance_percent=5, max_iterations=4000)
+    spec = KitSpec(method="pressure", faces=60, classes=4, tolerance_percent=5, max_iterations=4000, documents=False)
     return make_kit(potato_file, spec)
 
 

@@ -18,7 +18,7 @@ PALETTE = {"palette", "like", "multisets"}  # lengths and triangles from outside
 STALLED = 3  # exit status: the kit is written, but the asked tolerance was not reached
 NOT_AS_STATED = 1  # exit status of `check` for a kit whose files do not bear out its numbers
 TYPED_AS_TEXT = ("spacing", "bed_mm", "palette", "bevel_degrees")  # lists, which a person types as one word
-GROUPS = ("Input", "Mesh", "Congruence", "Pieces")  # in the order in which help shows them
+GROUPS = ("Input", "Mesh", "Congruence", "Pieces", "Output")  # in the order in which help shows them
 
 # ---- flags from KitSpec
 
@@ -157,9 +157,7 @@ def make(
     start = time.perf_counter()
     with StageLines(quiet=as_json) as lines:
         kit = make_kit(source, spec, lines.update)
-        lines.update("export", "", 0.0)
-        written = kit.write(folder, force=force)
-        lines.update("export", "", 1.0)
+        written = kit.write(folder, force=force, progress=lines.update)
     seconds = time.perf_counter() - start
     if as_json:
         show_json({"folder": str(written), "seconds": round(seconds, 3), **kit_summary(kit)})

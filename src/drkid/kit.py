@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drkid.mesh import Floats, Ints, TriMesh
+from drkid.progress import Progress, StageProgress, nobody
 from drkid.solid import Solid
 from drkid.spec import ConnectorKind, KitSpec, Unit
 
@@ -284,7 +285,8 @@ class Metrics:
 class Kit:
     """A whole construction kit; every length in mm of the printed object.
 
-    `spec` carries the automatic choices, so that the same kit can be made again from it.
+    `spec` carries the automatic choices, so that the same kit can be made again from it. `writer` writes the folder,
+    `documents` makes what people hold and look at: files by their names in the folder.
     """
 
     spec: KitSpec
@@ -296,12 +298,13 @@ class Kit:
     assembly: Assembly
     metrics: Metrics
     notes: tuple[str, ...]
-    writer: Callable[["Kit", Path, bool], Path]
+    writer: Callable[["Kit", Path, bool, StageProgress], Path]
+    documents: Callable[["Kit", Progress], dict[str, bytes]]
 
-    def write(self, folder: str | Path, *, force: bool = False) -> Path:
+    def write(self, folder: str | Path, *, force: bool = False, progress: StageProgress = nobody) -> Path:
         """Write the kit folder, whole or not at all, and return its path.
 
         Raises:
             KitFolderError: the folder exists and `force` is not given, or it cannot be written.
         """
-        return self.writer(self, Path(folder), force)
+        return self.writer(self, Path(folder), force, progress)

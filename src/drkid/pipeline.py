@@ -1,7 +1,7 @@
 """The one page that calls the stages in order: `make_kit(source, spec) -> Kit`."""
 
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -16,20 +16,14 @@ from drkid.kit import Decomposition, Kit, PartSet, Simplified, Surface
 from drkid.metrics import measure_kit
 from drkid.moulds import corrected_faces, faces_at_size, require_agreement, size_notes, with_moulds_of
 from drkid.parts import make_parts
-from drkid.progress import Progress, silent
+from drkid.progress import Progress, StageProgress, nobody, silent
 from drkid.remesh import simplify
+from drkid.report import make_documents
 from drkid.spec import DEFAULT_FACES, KitSpec
 from drkid.surface import extract_surface
 from drkid.volume import read_volume
 
-StageProgress = Callable[[str, str, float], None]
-"""Called with the stage, what it is doing, and the fraction of the stage that is done."""
-
 STAGES = ("surface", "remesh", "congruence", "parts", "assembly", "measure")
-
-
-def nobody(_stage: str, _what: str, _fraction: float) -> None:
-    """Tell nobody."""
 
 
 def make_kit(source: str | Path | None = None, spec: KitSpec | None = None, progress: StageProgress = nobody) -> Kit:
@@ -91,6 +85,7 @@ def make_kit(source: str | Path | None = None, spec: KitSpec | None = None, prog
             *_crossings(printed),
         ),
         writer=write_kit,
+        documents=make_documents,
     )
 
 

@@ -1,4 +1,4 @@
-"""How a stage tells how far it is: a callback, silent by default."""
+"""How a stage, or a run through several, tells how far it is: a callback, silent by default."""
 
 from collections.abc import Callable
 
@@ -8,3 +8,11 @@ Progress = Callable[[str, float], None]
 
 def silent(_what: str, _fraction: float) -> None:
     """Tell nobody."""
+
+
+StageProgress = Callable[[str, str, float], None]
+"""Called with the stage, what it is doing, and the fraction of the stage that is done."""
+
+
+def nobody(_stage: str, _what: str, _fraction: float) -> None:
+    """Tell nobody of any stage."""

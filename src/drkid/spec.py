@@ -237,6 +237,10 @@ class KitSpec(BaseModel):
     )
     bed_mm: Triple = _field((220.0, 220.0, 250.0), "Pieces", "Build volume X,Y,Z of the printer.")
 
+    documents: bool = _field(
+        True, "Output", "Write what people hold and look at too: build plates, net, guide, report and fit coupon."
+    )
+
     @model_validator(mode="before")
     @classmethod
     def _implied(cls, values: object) -> object:

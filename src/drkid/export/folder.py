@@ -21,6 +21,7 @@ from drkid.export.layout import (
 from drkid.export.ply import ply_bytes
 from drkid.export.stl import rounded, stl_bytes
 from drkid.kit import Kit
+from drkid.progress import StageProgress, nobody
 
 
 def require_writable(folder: Path, force: bool) -> None:
@@ -57,13 +58,15 @@ def _require_replaceable(folder: Path, force: bool) -> None:
         )
 
 
-def write_kit(kit: Kit, folder: Path, force: bool = False) -> Path:
+def write_kit(kit: Kit, folder: Path, force: bool = False, progress: StageProgress = nobody) -> Path:
     """Write the whole kit folder (kit-format, version 1) or nothing; returns its path.
 
     Raises:
         KitFolderError: as `require_writable`, or the disk refuses.
     """
     require_writable(folder, force)
+    documents = _documents(kit, progress)
+    progress("export", "", 0.0)
     folder = folder.absolute()
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
@@ -71,7 +74,7 @@ def write_kit(kit: Kit, folder: Path, force: bool = False) -> Path:
     except OSError as error:
         raise _unwritable(folder, error) from error
     try:
-        for name, content in kit_files(kit).items():
+        for name, content in (kit_files(kit) | documents).items():
             path = staging / name
             path.parent.mkdir(exist_ok=True)
             path.write_bytes(content)
@@ -81,7 +84,17 @@ def write_kit(kit: Kit, folder: Path, force: bool = False) -> Path:
         raise _unwritable(folder, error) from error
     finally:
         shutil.rmtree(staging, ignore_errors=True)
+    progress("export", "", 1.0)
     return folder
+
+
+def _documents(kit: Kit, progress: StageProgress) -> dict[str, bytes]:
+    if not kit.spec.documents:
+        return {}
+    progress("documents", "", 0.0)
+    made = kit.documents(kit, lambda what, fraction: progress("documents", what, fraction))
+    progress("documents", "", 1.0)
+    return made
 
 
 def _swap(staging: Path, folder: Path) -> None:
@@ -100,7 +113,7 @@ def _swap(staging: Path, folder: Path) -> None:
 
 
 def kit_files(kit: Kit) -> dict[str, bytes]:
-    """Every file of the kit folder by its name."""
+    """Every file of the kit folder but its documents, by its name."""
     solids = {part_name(part): part.solid for part in kit.part_set.parts}
     solids |= {connector_file(c.name): c.solid for c in kit.part_set.connectors}
     meshes = {name: rounded(solid.mesh()) for name, solid in solids.items()}
