@@ -7,7 +7,7 @@ from pathlib import Path
 
 from drkid.errors import KitFolderError
 from drkid.export.bill_of_materials import bom_csv, bom_json
-from drkid.export.kit_document import bom_rows, kit_document, part_name
+from drkid.export.kit_document import bom_rows, kit_document, printed_meshes
 from drkid.export.layout import (
     ASSEMBLED,
     BOM_CSV,
@@ -16,10 +16,9 @@ from drkid.export.layout import (
     PIECE_CLASS,
     SIMPLIFIED,
     SURFACE,
-    connector_file,
 )
 from drkid.export.ply import ply_bytes
-from drkid.export.stl import rounded, stl_bytes
+from drkid.export.stl import stl_bytes
 from drkid.kit import Kit
 from drkid.progress import StageProgress, nobody
 
@@ -114,9 +113,7 @@ def _swap(staging: Path, folder: Path) -> None:
 
 def kit_files(kit: Kit) -> dict[str, bytes]:
     """Every file of the kit folder but its documents, by its name."""
-    solids = {part_name(part): part.solid for part in kit.part_set.parts}
-    solids |= {connector_file(c.name): c.solid for c in kit.part_set.connectors}
-    meshes = {name: rounded(solid.mesh()) for name, solid in solids.items()}
+    meshes = printed_meshes(kit)
     rows = bom_rows(kit, {name: mesh.volume for name, mesh in meshes.items()})
     document = kit_document(kit).model_dump(mode="json", by_alias=True, exclude_none=True)
     document["spec"] = kit.spec.model_dump(mode="json")

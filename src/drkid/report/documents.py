@@ -2,10 +2,11 @@
 
 from collections.abc import Callable
 
+from drkid.export.plates import plate_files
 from drkid.kit import Kit
 from drkid.progress import Progress, silent
 
-_MAKERS: tuple[tuple[str, Callable[[Kit], dict[str, bytes]]], ...] = ()
+_MAKERS: tuple[tuple[str, Callable[[Kit], dict[str, bytes]]], ...] = (("plates", plate_files),)
 """What the progress line says, and the function that makes the files, by their names in the kit folder."""
 
 
