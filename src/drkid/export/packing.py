@@ -5,6 +5,7 @@ A place is free for a shape where its reference point lies outside the no-fit po
 grid cells are found once for each pair of shapes, so that a place costs a lookup and a placement a few unions.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -85,20 +86,23 @@ def longest_side_degrees(outline: Floats) -> float:
     return float(np.degrees(np.arctan2(y, x)))
 
 
-def pack(shapes: Sequence[Shape], counts: Sequence[int], sheet: Sheet, step_mm: float) -> list[Place]:
+def pack(
+    shapes: Sequence[Shape], counts: Sequence[int], sheet: Sheet, step_mm: float, *, aligned: bool = True
+) -> list[Place]:
     """Places of `counts[i]` copies of every shape i, in the order of shapes, sheets filled one after another.
 
     Of several rules the one is kept that needs the fewest sheets and the least height on the last: every copy as low
     as it will go, or in rows of copies that stand upright and upside down by turns, what is left above the rows filled
-    by the first rule. Places lie on a grid of `step_mm`, distances are kept exactly.
+    by the first rule. Turns are quarter turns, from the longest side along x where `aligned`; shapes that are not make
+    no rows. Places lie on a grid of `step_mm`, distances are kept exactly.
 
     Raises:
         ValueError: a shape is larger than the sheet.
     """
-    poses = [(i, turn, shape.turned(turn)) for i, shape in enumerate(shapes) for turn in _turns(shape)]
+    poses = [(i, turn, shape.turned(turn)) for i, shape in enumerate(shapes) for turn in _turns(shape, aligned)]
     table = _Table(poses, sheet, step_mm)
     order = [i for i, count in enumerate(counts) for _ in range(count)]
-    tried = [_filled(order, table, rows) for rows in ((), (0, 1), (2, 3))]
+    tried = [_filled(order, table, rows) for rows in (((), (0, 1), (2, 3)) if aligned else ((),))]
     return min(tried, key=lambda filled: filled[1])[0]
 
 
@@ -107,18 +111,19 @@ def _filled(order: list[int], table: "_Table", row_turns: tuple[int, ...]) -> tu
     sheets: list[_Filling] = []
     places: list[Place] = []
     first, before = 0, -1
+    left = Counter(order)
     for i in order:
         first, before = (first if i == before else 0), i  # what did not fit there will not for the next copy
         own = [p for p, pose in enumerate(table.poses) if pose[0] == i]
         first, pose, at = _first_free(sheets, own, table, first, row_turns)
-        sheets[first].place(pose, at)
+        left[i] -= 1
+        sheets[first].place(pose, at, [p for p, (other, _, _) in enumerate(table.poses) if left[other]])
         places.append(Place(i, first, table.poses[pose][1], *table.position(pose, at)))
     return places, (len(sheets), sheets[-1].top if sheets else 0.0)
 
 
-def _turns(shape: Shape) -> list[float]:
-    outline = max(shape.outlines, key=_area)
-    first = longest_side_degrees(outline) if len(shape.outlines) == 1 else 0.0
+def _turns(shape: Shape, aligned: bool) -> list[float]:
+    first = longest_side_degrees(max(shape.outlines, key=_area)) if aligned else 0.0
     return [turn - first for turn in TURNS_DEGREES]
 
 
@@ -231,10 +236,11 @@ class _Filling:
             return None
         return first // free.shape[1], first % free.shape[1]
 
-    def place(self, pose: int, at: tuple[int, int]) -> None:
-        """Take the cells of every grid that this placement rules out."""
+    def place(self, pose: int, at: tuple[int, int], others: list[int]) -> None:
+        """Take the cells that this placement rules out, of the grids of poses that are still to come."""
         self.top = max(self.top, self.table.top(pose, at))
-        for other, free in enumerate(self.free):
+        for other in others:
+            free = self.free[other]
             row, column, taken = self.table.cells(pose, other)
             row, column = row + at[0], column + at[1]
             r0, c0 = max(row, 0), max(column, 0)

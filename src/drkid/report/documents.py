@@ -5,8 +5,12 @@ from collections.abc import Callable
 from drkid.export.plates import plate_files
 from drkid.kit import Kit
 from drkid.progress import Progress, silent
+from drkid.report.net import net_files
 
-_MAKERS: tuple[tuple[str, Callable[[Kit], dict[str, bytes]]], ...] = (("plates", plate_files),)
+_MAKERS: tuple[tuple[str, Callable[[Kit], dict[str, bytes]]], ...] = (
+    ("plates", plate_files),
+    ("net", net_files),
+)
 """What the progress line says, and the function that makes the files, by their names in the kit folder."""
 
 
