@@ -199,6 +199,7 @@ class PartSet:
 
     `scale_mm_per_unit` takes the decomposition's unit to mm. Face f is made from `parts[face_part[f]]`, whose
     corner 0 lies at the face's corner `face_turn[f]`. `groove_mm` (E,) is each joint's widest visible gap.
+    `coupon` is a fit test as it lies on the bed, None where there is no connector.
     """
 
     scale_mm_per_unit: float
@@ -209,6 +210,7 @@ class PartSet:
     face_turn: Ints
     groove_mm: Floats
     notes: tuple[str, ...] = ()
+    coupon: Solid | None = None
 
 
 @dataclass(frozen=True, eq=False)

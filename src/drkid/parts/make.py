@@ -10,6 +10,7 @@ from drkid.errors import FitError
 from drkid.kit import Connector, Decomposition, Dimensions, Part, PartSet, class_id
 from drkid.mesh import Floats, Ints, read_only
 from drkid.parts.class_triangle import LEFT_CORNERS, is_mirror_symmetric, laid_down, printed_lengths
+from drkid.parts.coupon import coupon
 from drkid.parts.dimensions import proposed
 from drkid.parts.fit import FITS_MM, Margin, margins, smallest_scale
 from drkid.parts.groove import groove_mm, recesses
@@ -63,6 +64,7 @@ def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress =
         face_turn=members.turn,
         groove_mm=read_only(groove_mm(decomposition.mesh, members, recess)),
         notes=notes(decomposition, members, design.dimensions, spec, recess, scale),
+        coupon=coupon(design.dimensions, spec, sharpest),
     )
 
 

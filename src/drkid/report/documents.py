@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from drkid.export.coupon import coupon_files
 from drkid.export.plates import plate_files
 from drkid.kit import Kit
 from drkid.progress import Progress, silent
@@ -10,6 +11,7 @@ from drkid.report.net import net_files
 _MAKERS: tuple[tuple[str, Callable[[Kit], dict[str, bytes]]], ...] = (
     ("plates", plate_files),
     ("net", net_files),
+    ("fit coupon", coupon_files),
 )
 """What the progress line says, and the function that makes the files, by their names in the kit folder."""
 
