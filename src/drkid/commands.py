@@ -18,7 +18,8 @@ PALETTE = {"palette", "like", "multisets"}  # lengths and triangles from outside
 MOST_EXPLODED = 10.0  # times the distance to the middle; pieces are specks beyond it
 STALLED = 3  # exit status: the kit is written, but the asked tolerance was not reached
 NOT_AS_STATED = 1  # exit status of `check` for a kit whose files do not bear out its numbers
-TYPED_AS_TEXT = ("spacing", "bed_mm", "palette", "bevel_degrees")  # lists, which a person types as one word
+ALIASES = {"bed_mm": "--bed"}  # shorter names of flags
+TYPED_AS_TEXT = ("spacing", "bed_mm", "palette", "bevel_degrees", "spares")  # lists, which a person types as one word
 NOT_TYPED = ("process_values",)  # written to kit.json and read from it, but no flag
 FROM_PROCESS = {  # what kit.json has because of its process
     "process_values",
@@ -48,7 +49,10 @@ def _spec_parameters() -> list[inspect.Parameter]:
         annotation: Any = str if name in TYPED_AS_TEXT else field.annotation
         default = "" if field.default is None else f" [default: {_shown(field.default)}]"
         option = Parameter(
-            help=f"{field.description}{default}", group=Group(group, sort_key=GROUPS.index(group)), show_default=False
+            help=f"{field.description}{default}",
+            group=Group(group, sort_key=GROUPS.index(group)),
+            show_default=False,
+            alias=ALIASES.get(name),
         )
         found.append(
             inspect.Parameter(
@@ -87,6 +91,7 @@ def _replaced(values: dict[str, Any], given: dict[str, Any]) -> set[str]:
         replaced.add("multisets")
     if "seconds" in given:
         replaced.add("rounds")
+    replaced |= {"printer", "bed_mm"} if given.keys() & {"printer", "bed_mm"} else set()
     if given.get("method", "palette") != "palette":
         return replaced | PALETTE
     if given.keys() & {"palette", "like"}:

@@ -260,6 +260,7 @@ class PartSet:
     `scale_mm_per_unit` takes the decomposition's unit to mm. Face f is made from `parts[face_part[f]]`, whose
     corner 0 lies at the face's corner `face_turn[f]`. `groove_mm` (E,) is each joint's widest visible gap;
     `groove_choices` is what bevels made for this shape alone, and further variants of them, would make of it.
+    `coupon` is a fit test as it lies on the bed, None where there is no connector.
     """
 
     scale_mm_per_unit: float
@@ -272,6 +273,7 @@ class PartSet:
     notes: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
     groove_choices: tuple[GrooveChoice, ...] = ()
+    coupon: Solid | None = None
 
 
 @dataclass(frozen=True, eq=False)

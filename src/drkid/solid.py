@@ -8,7 +8,7 @@ import manifold3d
 import numpy as np
 from numpy.typing import ArrayLike
 
-from drkid.mesh import Floats, TriMesh
+from drkid.mesh import Floats, Ints, TriMesh
 
 CIRCLE_SEGMENTS = 48  # facets of a round shape: less than 0.01 mm off the circle at hinge radii
 
@@ -126,3 +126,8 @@ class Solid:
     def cross_section(self, z: float) -> Sequence[Floats]:
         """The polygons, each (n, 2), in which the plane at height z cuts the solid."""
         return [np.asarray(p, np.float64) for p in self.body.slice(z).to_polygons()]
+
+
+def triangulated(outline: Floats) -> Ints:
+    """(m, 3): corners of triangles, counter-clockwise, that cover a simple counter-clockwise polygon (n, 2)."""
+    return np.asarray(manifold3d.triangulate([np.asarray(outline, np.float64)]), np.int64)

@@ -14,6 +14,27 @@ Thickening = Literal["bisector", "flippable", "mean_normal", "perpendicular"]
 ConnectorKind = Literal["hinge", "snap", "box", "none"]
 Retention = Literal["detent", "glue"]
 Unit = Literal["angstrom", "nm", "um", "mm"]
+Paper = Literal["a4", "a3", "a2", "a1", "a0", "letter", "tabloid"]
+Printer = Literal[
+    "bambu-a1", "bambu-a1-mini", "bambu-x1", "creality-k1", "ender-3", "formlabs-form3", "formlabs-form4",
+    "prusa-core-one", "prusa-mini", "prusa-mk4", "prusa-xl", "ultimaker-s5",
+]  # fmt: skip
+
+PRINTERS: dict[Printer, tuple[float, float, float]] = {
+    "bambu-a1": (256.0, 256.0, 256.0),
+    "bambu-a1-mini": (180.0, 180.0, 180.0),
+    "bambu-x1": (256.0, 256.0, 256.0),
+    "creality-k1": (220.0, 220.0, 250.0),
+    "ender-3": (220.0, 220.0, 250.0),
+    "formlabs-form3": (145.0, 145.0, 185.0),
+    "formlabs-form4": (200.0, 125.0, 210.0),
+    "prusa-core-one": (250.0, 220.0, 270.0),
+    "prusa-mini": (180.0, 180.0, 180.0),
+    "prusa-mk4": (250.0, 210.0, 220.0),
+    "prusa-xl": (360.0, 360.0, 360.0),
+    "ultimaker-s5": (330.0, 240.0, 300.0),
+}
+"""Build volumes X, Y, Z in mm, as their makers state them."""
 
 DEFAULT_FACES = 172  # the size of the paper's printed mitochondrion (table 1, M4)
 PRESSURE_CLASSES = 7  # of the same print
@@ -93,12 +114,31 @@ def _multisets(text: str) -> str:
     return ",".join(words)
 
 
+def _number_as_text(value: object) -> object:
+    return str(value) if isinstance(value, int) else value
+
+
+def _spares(text: str) -> str:
+    """'5%' or '12', without spaces."""
+    word = text.replace(" ", "")
+    try:
+        sound = 0 <= float(word.removesuffix("%")) < float("inf") if word.endswith("%") else int(word) >= 0
+    except ValueError:
+        sound = False
+    if not sound:
+        message = "a whole number of spares of each part, or a percentage such as 5%"
+        raise ValueError(message)
+    return word
+
+
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Bend = Annotated[float, Field(ge=0, le=130)]
 Bends = Annotated[tuple[Bend, Bend], BeforeValidator(_split_commas)]
 Lengths = Annotated[tuple[Positive, ...], BeforeValidator(_lengths), AfterValidator(_distinct)]
 Multisets = Annotated[str, AfterValidator(_multisets)]
 Triple = Annotated[tuple[Positive, Positive, Positive], BeforeValidator(_split_commas)]
+Spares = Annotated[str, BeforeValidator(_number_as_text), AfterValidator(_spares)]
+Price = Annotated[float | None, Field(ge=0, allow_inf_nan=False)]
 
 
 def _field(default: object, group: str, text: str, **limits: Any) -> Any:
@@ -254,6 +294,22 @@ class KitSpec(BaseModel):
     documents: bool = _field(
         True, "Output", "Write what people hold and look at too: build plates, net, guide, report and fit coupon."
     )
+    printer: Printer | None = _field(None, "Output", "Printer whose bed plates are packed for, in place of --bed.")
+    spares: Spares = _field(
+        "0", "Output", "Spare copies of each part: a number, or a percentage of its count such as 5%, rounded up."
+    )
+    price_per_kg: Price = _field(
+        None, "Output", "Price of printing a kilogramme, in your currency: adds what each part costs."
+    )
+    mould_price: Price = _field(None, "Output", "Price of one injection mould, to compare printing with moulding.")
+    moulded_price_per_piece: float = _field(
+        0.1, "Output", "Price of one moulded piece, material and machine, for the same comparison.", ge=0
+    )
+    paper: Paper = _field("a4", "Output", "Paper that the net is printed on.")
+    net_scale: Positive = _field(
+        1.0, "Output", "Size of the paper model, 1 being the kit's own; less where a piece is larger than a page."
+    )
+    net_on_one_page: bool = _field(False, "Output", "Shrink the whole net onto one page.")
 
     @model_validator(mode="before")
     @classmethod
@@ -262,7 +318,7 @@ class KitSpec(BaseModel):
         if not isinstance(values, dict):
             return values
         given = cast("dict[str, object]", values)
-        return _implied_by_palette(given) | given | _own_process(given)
+        return _implied_by_palette(given) | _implied_by_printer(given) | given | _own_process(given)
 
     @model_validator(mode="after")
     def _consistent(self) -> "KitSpec":
@@ -351,6 +407,11 @@ def _implied_by_palette(given: dict[str, object]) -> dict[str, object]:
     return {"method": "palette", "classes": max(classes, 1), **bevel}
 
 
+def _implied_by_printer(given: dict[str, object]) -> dict[str, object]:
+    bed = next((bed for name, bed in PRINTERS.items() if name == given.get("printer")), None)
+    return {} if bed is None else {"bed_mm": bed}
+
+
 def _is_bisected(given: dict[str, object]) -> bool:
     return given.get("thickening", "bisector") == "bisector"
 
@@ -370,6 +431,8 @@ def _contradiction(spec: KitSpec) -> str:
         return (
             f"bevel_variants is {spec.bevel_variants} and {rule}: pieces of a class then have one bevel, whatever meets"
         )
+    if spec.printer is not None and spec.bed_mm != PRINTERS[spec.printer]:
+        return f"printer is {spec.printer} and bed_mm is another than its own: give one of them"
     return _palette_contradiction(spec)
 
 

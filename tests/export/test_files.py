@@ -16,6 +16,7 @@ from drkid.export.stl import rounded, stl_bytes
 from drkid.kit import class_id
 from drkid.mesh import TriMesh
 from drkid.solid import Solid
+from drkid.spec import KitSpec
 
 
 def read(content: bytes, kind: str) -> trimesh.Trimesh:
@@ -68,14 +69,15 @@ def split_edge(mesh: TriMesh) -> np.ndarray:
 
 def test_parts_list_is_the_same_in_csv_and_json():
     rows = [
-        piece_row("parts/A.stl", 0, 12, 1000.0, 1.24),
-        connector_row("connector_half", "parts/connector_half.stl", 36, 50.0, 1.24),
-        rod_row(2.0, 6.4, 18),
+        piece_row("parts/A.stl", 0, 12, 1000.0, KitSpec()),
+        connector_row("connector_half", "parts/connector_half.stl", 36, 50.0, KitSpec()),
+        rod_row(2.0, 6.4, 18, KitSpec()),
     ]
     from_csv = list(csv.DictReader(io.StringIO(bom_csv(rows))))
     from_json = json.loads(bom_json(rows))
     columns = ["part", "file", "count", "spare", "volume_mm3", "mass_g", "colour", "diameter", "length"]
-    assert list(from_csv[0]) == columns
+    further = ["total_mass_g", "total_length", "cost", "total_cost"]
+    assert list(from_csv[0]) == columns + further
     for one, other in zip(from_csv, from_json, strict=True):
         assert one == {name: "" if value is None else str(value) for name, value in other.items()}
     assert from_json[0]["mass_g"] == pytest.approx(1.24)

@@ -4,14 +4,22 @@ import csv
 import io
 import json
 from dataclasses import asdict, dataclass, fields
+from math import ceil
 
 from drkid.export.colour import CONNECTOR_COLOUR, class_colour
 from drkid.kit import class_id
+from drkid.spec import KitSpec
+
+ROUNDING = 1e-9  # 5 % of 40 are 2 spares, whatever the last bit says
 
 
 @dataclass(frozen=True)
 class Row:
-    """A line of the parts list; what does not apply is None and an empty cell."""
+    """A line of the parts list; what does not apply is None and an empty cell.
+
+    `volume_mm3`, `mass_g`, `length` and `cost` are those of one part, in mm, g and the currency of the given price;
+    `total_…` of all of them, spares included: for rods `total_length` is the stock to buy.
+    """
 
     part: str
     file: str
@@ -22,22 +30,74 @@ class Row:
     colour: str | None = None
     diameter: float | None = None
     length: float | None = None
+    total_mass_g: float | None = None
+    total_length: float | None = None
+    cost: float | None = None
+    total_cost: float | None = None
 
 
-def piece_row(file: str, class_index: int, count: int, volume_mm3: float, density_g_cm3: float) -> Row:
+@dataclass(frozen=True)
+class Moulding:
+    """Printing a kit against moulding it, spares and rods apart, in the currency of the given prices.
+
+    Moulds pay from `break_even_kits` kits on; None where a moulded kit costs no less than a printed one.
+    """
+
+    moulds: int
+    moulds_cost: float
+    printed_kit_cost: float
+    moulded_kit_cost: float
+    break_even_kits: int | None
+
+
+def spare_count(spares: str, count: int) -> int:
+    """How many spares of a part that is there `count` times: '5%' of them, rounded up, or so many of each."""
+    if not spares.endswith("%"):
+        return int(spares)
+    return ceil(float(spares[:-1]) / 100 * count - ROUNDING)
+
+
+def piece_row(file: str, class_index: int, count: int, volume_mm3: float, spec: KitSpec) -> Row:
     """A printed piece."""
-    mass = volume_mm3 * density_g_cm3 / 1000
-    return Row(f"piece {class_id(class_index)}", file, count, 0, volume_mm3, mass, class_colour(class_index))
+    return _printed(f"piece {class_id(class_index)}", file, count, volume_mm3, class_colour(class_index), spec)
 
 
-def connector_row(name: str, file: str, count: int, volume_mm3: float, density_g_cm3: float) -> Row:
+def connector_row(name: str, file: str, count: int, volume_mm3: float, spec: KitSpec) -> Row:
     """A printed connector part."""
-    return Row(name, file, count, 0, volume_mm3, volume_mm3 * density_g_cm3 / 1000, CONNECTOR_COLOUR)
+    return _printed(name, file, count, volume_mm3, CONNECTOR_COLOUR, spec)
 
 
-def rod_row(diameter_mm: float, length_mm: float, count: int) -> Row:
+def rod_row(diameter_mm: float, length_mm: float, count: int, spec: KitSpec) -> Row:
     """Metal rods, cut to length."""
-    return Row("rod", "", count, diameter=diameter_mm, length=length_mm)
+    spare = spare_count(spec.spares, count)
+    total = (count + spare) * length_mm
+    return Row("rod", "", count, spare, diameter=diameter_mm, length=length_mm, total_length=total)
+
+
+def _printed(part: str, file: str, count: int, volume_mm3: float, colour: str, spec: KitSpec) -> Row:
+    spare = spare_count(spec.spares, count)
+    mass = volume_mm3 * spec.preset.density_g_cm3 / 1000
+    cost = None if spec.price_per_kg is None else mass / 1000 * spec.price_per_kg
+    return Row(
+        part, file, count, spare, volume_mm3, mass, colour,
+        total_mass_g=(count + spare) * mass,
+        cost=cost,
+        total_cost=None if cost is None else (count + spare) * cost,
+    )  # fmt: skip
+
+
+def moulding(rows: list[Row], spec: KitSpec) -> Moulding | None:
+    """The comparison, one mould for each printed shape; None where a price is not given."""
+    printed = [row for row in rows if row.file]
+    costs = [row.cost for row in printed if row.cost is not None]
+    if spec.mould_price is None or len(costs) < len(printed):
+        return None
+    printed_kit = sum(row.count * cost for row, cost in zip(printed, costs, strict=True))
+    moulded_kit = sum(row.count for row in printed) * spec.moulded_price_per_piece
+    moulds_cost = len(printed) * spec.mould_price
+    saved = printed_kit - moulded_kit
+    kits = max(1, ceil(moulds_cost / saved - ROUNDING)) if saved > 0 else None
+    return Moulding(len(printed), moulds_cost, printed_kit, moulded_kit, kits)
 
 
 def bom_csv(rows: list[Row]) -> str:

@@ -6,8 +6,8 @@ import tempfile
 from pathlib import Path
 
 from drkid.errors import KitFolderError
-from drkid.export.bill_of_materials import Row, bom_csv, bom_json
-from drkid.export.kit_document import bom_rows, kit_document, part_name
+from drkid.export.bill_of_materials import bom_csv, bom_json
+from drkid.export.kit_document import kit_document, parts_list, printed_meshes
 from drkid.export.layout import (
     ASSEMBLED,
     BOM_CSV,
@@ -16,12 +16,10 @@ from drkid.export.layout import (
     PIECE_CLASS,
     SIMPLIFIED,
     SURFACE,
-    connector_file,
 )
 from drkid.export.ply import ply_bytes
-from drkid.export.stl import rounded, stl_bytes
+from drkid.export.stl import stl_bytes
 from drkid.kit import Kit
-from drkid.mesh import TriMesh
 from drkid.progress import StageProgress, nobody
 
 
@@ -115,7 +113,7 @@ def _swap(staging: Path, folder: Path) -> None:
 
 def kit_files(kit: Kit) -> dict[str, bytes]:
     """Every file of the kit folder but its documents, by its name."""
-    meshes = part_meshes(kit)
+    meshes = printed_meshes(kit)
     rows = parts_list(kit, meshes)
     document = kit_document(kit).model_dump(mode="json", by_alias=True, exclude_none=True)
     document["spec"] = kit.spec.model_dump(mode="json")
@@ -128,18 +126,6 @@ def kit_files(kit: Kit) -> dict[str, bytes]:
         BOM_JSON: bom_json(rows).encode(),
         KIT_JSON: (json.dumps(document, indent=1) + "\n").encode(),
     }
-
-
-def part_meshes(kit: Kit) -> dict[str, TriMesh]:
-    """The mesh of every part and connector by its file, as written."""
-    solids = {part_name(part): part.solid for part in kit.part_set.parts}
-    solids |= {connector_file(c.name): c.solid for c in kit.part_set.connectors}
-    return {name: rounded(solid.mesh()) for name, solid in solids.items()}
-
-
-def parts_list(kit: Kit, meshes: dict[str, TriMesh]) -> list[Row]:
-    """The rows of the parts list; `meshes` are those of `part_meshes`."""
-    return bom_rows(kit, {name: mesh.volume for name, mesh in meshes.items()})
 
 
 def _unwritable(folder: Path, error: OSError) -> KitFolderError:

@@ -10,8 +10,9 @@ from drkid import __version__
 from drkid.export import document as doc
 from drkid.export.bill_of_materials import Row, connector_row, piece_row, rod_row
 from drkid.export.layout import connector_file, part_file
+from drkid.export.stl import rounded
 from drkid.kit import Distance, Kit, Metrics, Part, class_id
-from drkid.mesh import Floats
+from drkid.mesh import Floats, TriMesh
 
 MOST_RECORDS = 500  # of the convergence history; a plot shows no more
 
@@ -77,18 +78,29 @@ def kit_summary(kit: Kit) -> dict[str, Any]:
 
 def bom_rows(kit: Kit, volumes_mm3: dict[str, float]) -> list[Row]:
     """The parts list; `volumes_mm3` are those of the written files."""
-    counts = Counter(piece.part for piece in kit.assembly.pieces)
-    density = kit.spec.preset.density_g_cm3
+    counts, spec = Counter(piece.part for piece in kit.assembly.pieces), kit.spec
     rows = [
-        piece_row(part_name(part), part.class_index, counts[i], volumes_mm3[part_name(part)], density)
+        piece_row(part_name(part), part.class_index, counts[i], volumes_mm3[part_name(part)], spec)
         for i, part in enumerate(kit.part_set.parts)
     ]
     for item in _hardware(kit):
         if item.file is not None:
-            rows.append(connector_row(item.name or item.file, item.file, item.count, volumes_mm3[item.file], density))
+            rows.append(connector_row(item.name or item.file, item.file, item.count, volumes_mm3[item.file], spec))
         else:
-            rows.append(rod_row(item.diameter or 0.0, item.length or 0.0, item.count))
+            rows.append(rod_row(item.diameter or 0.0, item.length or 0.0, item.count, spec))
     return rows
+
+
+def printed_meshes(kit: Kit) -> dict[str, TriMesh]:
+    """The mesh of each printed part as its file holds it, by the file's name."""
+    solids = {part_name(part): part.solid for part in kit.part_set.parts}
+    solids |= {connector_file(c.name): c.solid for c in kit.part_set.connectors}
+    return {name: rounded(solid.mesh()) for name, solid in solids.items()}
+
+
+def parts_list(kit: Kit, meshes: dict[str, TriMesh]) -> list[Row]:
+    """The rows of the parts list; `meshes` are those of `printed_meshes`."""
+    return bom_rows(kit, {name: mesh.volume for name, mesh in meshes.items()})
 
 
 def _classes(kit: Kit, counts: Counter[int]) -> list[doc.ClassDocument]:

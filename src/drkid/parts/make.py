@@ -13,6 +13,7 @@ from drkid.mesh import Floats, Ints, read_only
 from drkid.parts.bevel import require_bends
 from drkid.parts.bevel_variants import Moulds, moulds
 from drkid.parts.class_triangle import LEFT_CORNERS, is_mirror_symmetric, laid_down, printed_lengths
+from drkid.parts.coupon import coupon
 from drkid.parts.dimensions import proposals
 from drkid.parts.fit import FITS_MM, Margin, margins, smallest_scale
 from drkid.parts.groove import groove_mm
@@ -82,6 +83,7 @@ def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress =
             design.triangles(scale), shapes, np.unique(members.face_class).tolist(), found, design.dimensions, spec
         ),
         groove_choices=choices,
+        coupon=coupon(design.dimensions, spec),
     )
 
 

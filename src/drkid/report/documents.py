@@ -2,14 +2,17 @@
 
 from collections.abc import Callable
 
-from drkid.export.folder import part_meshes, parts_list
+from drkid.export.coupon import coupon_files
+from drkid.export.kit_document import parts_list, printed_meshes
 from drkid.export.layout import GUIDE_HTML, GUIDE_PDF, REPORT
+from drkid.export.plates import plate_files
 from drkid.kit import Kit
 from drkid.progress import Progress, silent
 from drkid.report.guide import Guide
 from drkid.report.guide_html import guide_html
 from drkid.report.guide_pages import guide_pages
 from drkid.report.guide_pdf import guide_pdf
+from drkid.report.net import net_files
 from drkid.report.report import report_html
 from drkid.report.scene import scene_of
 
@@ -24,10 +27,16 @@ def _guide(kit: Kit) -> dict[str, bytes]:
 
 
 def _report(kit: Kit) -> dict[str, bytes]:
-    return {REPORT: report_html(scene_of(kit), parts_list(kit, part_meshes(kit))).encode()}
+    return {REPORT: report_html(scene_of(kit), parts_list(kit, printed_meshes(kit))).encode()}
 
 
-_MAKERS: tuple[tuple[str, Callable[[Kit], dict[str, bytes]]], ...] = (("guide", _guide), ("report", _report))
+_MAKERS: tuple[tuple[str, Callable[[Kit], dict[str, bytes]]], ...] = (
+    ("plates", plate_files),
+    ("net", net_files),
+    ("guide", _guide),
+    ("report", _report),
+    ("fit coupon", coupon_files),
+)
 """What the progress line says, and the function that makes the files, by their names in the kit folder."""
 
 
