@@ -192,8 +192,8 @@ def show_inspection(found: "Inspection") -> None:
 
 def _show_distances(console: Console, found: "Inspection") -> None:
     if found.distances:
-        table = Table("faces", "mean %", "max %", title_justify="left", box=None)
-        table.title = "expected distance from the surface, of its box"
+        console.print("[bold]expected distance from the surface[/] of the simplified mesh, in % of the box's diagonal")
+        table = Table("faces", "mean %", "max %", box=None)
         for one in found.distances:
             table.add_row(str(one.faces), f"{one.mean_percent:.2g}", f"{one.max_percent:.2g}")
         console.print(table)
