@@ -70,7 +70,11 @@ def test_there_are_commands_to_try():
 
 
 @pytest.mark.parametrize("line", commands())
-def test_commands_parse(line):
+def test_commands_parse(line, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for fence in fences("toml"):  # files that commands name: their first line says which
+        name, _, body = fence.values[0].partition("\n")
+        (tmp_path / name.removeprefix("# ")).write_text(body)
     arguments = shlex.split(line, comments=True)[1:]
     command, bound, _ = app.parse_args(arguments, exit_on_error=False, print_error=False)
     assert callable(command)
