@@ -10,6 +10,7 @@ from scripts import load_script
 
 from drkid import KitSpec, __version__
 from drkid.cli import app
+from drkid.process import PROCESSES
 
 PAGES = sorted([*REPOSITORY.glob("*.md"), *(REPOSITORY / "docs").rglob("*.md")])
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
@@ -95,7 +96,11 @@ def test_python_compiles(text):
 
 @pytest.mark.parametrize("text", fences("toml"))
 def test_toml_is_a_spec(text):
-    assert KitSpec.parse(tomllib.loads(text))
+    values = tomllib.loads(text)
+    if "based_on" in values:
+        assert PROCESSES[values.pop("based_on")].model_copy(update=values).model_dump().keys() >= values.keys()
+    else:
+        assert KitSpec.parse(values)
 
 
 @pytest.mark.parametrize(
