@@ -10,7 +10,7 @@ from scripts import load_script
 
 from drkid import KitSpec, __version__
 from drkid.cli import app
-from drkid.process import PROCESSES
+from drkid.process import PROCESSES, ProcessPreset
 
 PAGES = sorted([*REPOSITORY.glob("*.md"), *(REPOSITORY / "docs").rglob("*.md")])
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
@@ -98,7 +98,7 @@ def test_python_compiles(text):
 def test_toml_is_a_spec(text):
     values = tomllib.loads(text)
     if "based_on" in values:
-        assert PROCESSES[values.pop("based_on")].model_copy(update=values).model_dump().keys() >= values.keys()
+        assert ProcessPreset.model_validate(PROCESSES[values.pop("based_on")].model_dump() | values)
     else:
         assert KitSpec.parse(values)
 
