@@ -212,6 +212,15 @@ def test_parameters_come_from_toml_and_flags_override_them(potato_file, tmp_path
             {"classes": 5, "tolerance_percent": 2.0},
         ),
         ({"method": "pressure", "classes": 6}, {"method": "pressure"}, {"classes": 6}),
+        ({"size_mm": 200.0}, {"fit": True}, {"size_mm": None, "fit": True}),
+        ({"size_mm": 200.0}, {"mean_edge_mm": 40.0}, {"size_mm": None, "mean_edge_mm": 40.0}),
+        (
+            {"process": "fdm", "clearance_mm": 0.2, "thickness_mm": 6.9, "knuckles": 2},
+            {"process": "sla"},
+            {"process": "sla", "clearance_mm": None, "thickness_mm": None, "knuckles": None},
+        ),
+        ({"process": "fdm", "clearance_mm": 0.3}, {"process": "fdm"}, {"clearance_mm": 0.3}),
+        ({"connector": "hinge", "thickness_mm": 6.9}, {"connector": "snap"}, {"thickness_mm": None}),
     ],
 )
 def test_a_flag_takes_the_place_of_what_a_file_has_chosen_for_another(file, flags, expected, tmp_path):

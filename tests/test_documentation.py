@@ -10,6 +10,7 @@ from scripts import load_script
 
 from drkid import KitSpec, __version__
 from drkid.cli import app
+from drkid.process import PROCESSES, ProcessPreset
 
 PAGES = sorted([*REPOSITORY.glob("*.md"), *(REPOSITORY / "docs").rglob("*.md")])
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
@@ -70,7 +71,11 @@ def test_there_are_commands_to_try():
 
 
 @pytest.mark.parametrize("line", commands())
-def test_commands_parse(line):
+def test_commands_parse(line, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for fence in fences("toml"):  # files that commands name: their first line says which
+        name, _, body = fence.values[0].partition("\n")
+        (tmp_path / name.removeprefix("# ")).write_text(body)
     arguments = shlex.split(line, comments=True)[1:]
     command, bound, _ = app.parse_args(arguments, exit_on_error=False, print_error=False)
     assert callable(command)
@@ -91,7 +96,11 @@ def test_python_compiles(text):
 
 @pytest.mark.parametrize("text", fences("toml"))
 def test_toml_is_a_spec(text):
-    assert KitSpec.parse(tomllib.loads(text))
+    values = tomllib.loads(text)
+    if "based_on" in values:
+        assert ProcessPreset.model_validate(PROCESSES[values.pop("based_on")].model_dump() | values)
+    else:
+        assert KitSpec.parse(values)
 
 
 @pytest.mark.parametrize(

@@ -36,8 +36,17 @@ from drkid.congruence.palette import Palette, palette_of_classes
 from drkid.congruence.quadratic_model import connectivity, quadratic_model
 from drkid.congruence.target import Target
 from drkid.export.colour import CONNECTOR_COLOUR, class_colour
+from drkid.kit import Dimensions, Part
 from drkid.mesh import Bools, Floats, TriMesh
 from drkid.parts import make_parts
+from drkid.parts.class_triangle import laid_down
+from drkid.parts.detent import bump
+from drkid.parts.dimensions import proposed
+from drkid.parts.hinge import hinge_half
+from drkid.parts.marks import marked
+from drkid.parts.pocket import pocket, side_frames
+from drkid.parts.prismoid import bevelled
+from drkid.parts.snap import snap_half
 from drkid.report.colouring import channels as colour
 from drkid.report.picture import Body, camera, render
 from drkid.solid import Solid
@@ -224,6 +233,129 @@ def joined(made: Kit, half: TriMesh) -> tuple[list[Body], Floats]:
 def carried(mesh: TriMesh, matrix: Floats) -> TriMesh:
     """The mesh carried by a 4×4 matrix."""
     return mesh.moved(mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3])
+
+
+BEND = 24.0  # of the joint that is drawn in section, degrees
+SIDES_MM = (34.0, 34.0, 38.0)  # of the piece that is drawn
+
+
+def joint() -> None:
+    """A marked piece, both halves, and a joint in section with its clearances, by the default process."""
+    spec = KitSpec()
+    d = proposed(spec, BEND + spec.swing_degrees)
+    half = hinge_half(d).solid
+    block = joint_piece(d)
+    figure, axes = plt.subplots(2, 3, figsize=(10, 5.6), layout="constrained")
+    snap = snap_half(proposed(KitSpec(connector="snap"), BEND)).solid
+    below, close = camera(-100, -62), camera(-70, 35)
+    tint, grey = colour(class_colour(0)), colour(CONNECTOR_COLOUR)
+    for axis, body, view, title in (
+        (axes[0, 0], Body(drawn_piece(d).solid.mesh(), tint), below, "a piece from inside"),
+        (axes[0, 1], Body(half.mesh(), grey), close, "a hinge half, its bump at either end"),
+        (axes[0, 2], Body(snap.mesh(), grey), close, "a snap half: clip and pin"),
+    ):
+        axis.imshow(render([body], view, 460))
+        axis.set_title(title, fontsize=9)
+        axis.axis("off")
+    across(axes[1, 0], d, block, half)
+    along(axes[1, 1], d, block, half)
+    table(axes[1, 2], d)
+    figure.savefig(HERE / "joint.png", dpi=120)
+
+
+def drawn_piece(d: Dimensions) -> Part:
+    """A piece with pockets and marks."""
+    triangle = laid_down(np.array(SIDES_MM))
+    inset = d.thickness_mm / 2 * np.tan(np.radians(BEND / 2)) * np.array([[1.0] * 3, [-0.3] * 3])
+    frames = side_frames(triangle)
+    solid = bevelled(triangle, inset, d.thickness_mm).solid.minus_all([pocket(d).moved(f) for f in frames])
+    part = Part(0, "any", np.column_stack([triangle, np.zeros(3)]), frames, solid)
+    preset = KitSpec().preset
+    return marked(part, d, preset.engrave_width_mm, preset.mark_depth_mm)[0]
+
+
+def joint_piece(d: Dimensions) -> Solid:
+    """The side of a piece at a joint, in connector coordinates."""
+    t, lean = d.thickness_mm / 2, np.tan(np.radians((BEND + KitSpec().swing_degrees) / 2))
+    profile = np.array([(t * lean, -t), (-t * lean, t), (11.0, t), (11.0, -t)])
+    return Solid.prism_along_x(profile, -8.0, 8.0) - pocket(d)
+
+
+def across(axis: Axes, d: Dimensions, block: Solid, half: Solid) -> None:
+    """The cut across the axis, through a knuckle."""
+    look = np.array([[0, 1.0, 0, 0], [0, 0, 1.0, 0], [1.0, 0, 0, d.pocket_width_mm / 4], [0, 0, 0, 1]])
+    round_ = np.diag([-1.0, -1.0, 1.0, 1.0])
+    turned = lambda degrees: about_x(degrees) @ round_  # noqa: E731 — the other side of the joint
+    for motion, tint in ((about_x(-BEND / 2), class_colour(0)), (turned(BEND / 2), class_colour(1))):
+        cut(axis, block.moved(look @ motion), colour(tint))
+    for motion in (about_x(-BEND / 2), turned(BEND / 2)):
+        cut(axis, half.moved(look @ motion), colour(CONNECTOR_COLOUR))
+    cut(axis, Solid.cylinder_along_x(d.rod_diameter_mm / 2, -9, 9).moved(look), STEEL)
+    axis.set_title("a joint cut across its axis, outside up", fontsize=9)
+    axis.set(aspect="equal", xlim=(-10, 10), ylim=(-6.5, 5.5))
+    axis.axis("off")
+
+
+def along(axis: Axes, d: Dimensions, block: Solid, half: Solid) -> None:
+    """The cut across a half's grip, through both bumps, seen along the piece."""
+    ridge = bump(d)
+    assert ridge is not None
+    y = (ridge.start + ridge.end) / 2
+    look = np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, -1.0, 0, y], [0, 0, 0, 1]])
+    cut(axis, block.moved(look), colour(class_colour(0)))
+    cut(axis, half.moved(look), colour(CONNECTOR_COLOUR))
+    width = d.pocket_width_mm / 2
+    note = {"fontsize": 8, "arrowprops": {"arrowstyle": "-", "lw": 0.6}}
+    axis.annotate(f"{d.clearance_mm:g}", (width - d.clearance_mm / 2, 0.8), (5.4, 4.2), **note)
+    axis.annotate(f"bump {d.detent_mm:g}", (width, ridge.z), (4.6, -5.2), **note)
+    axis.annotate(f"{d.clearance_mm:g}", (-1.0, d.pocket_height_mm / 2 - d.clearance_mm / 2), (-3, 4.2), **note)
+    axis.annotate("pressed in from here", (0, -d.barrel_diameter_mm / 2), (-6, -5.2), **note)
+    axis.set_title("a half in its pocket, cut across the grip", fontsize=9)
+    axis.set(aspect="equal", xlim=(-8.5, 8.5), ylim=(-6.5, 5.5))
+    axis.axis("off")
+
+
+def table(axis: Axes, d: Dimensions) -> None:
+    """The lengths of the joint, mm."""
+    rows = {
+        "thickness": d.thickness_mm,
+        "rod": d.rod_diameter_mm,
+        "gap around the rod": d.rod_clearance_mm,
+        "knuckle wall": d.knuckle_wall_mm,
+        "barrel": d.barrel_diameter_mm,
+        "gap in the pocket": d.clearance_mm,
+        "gap between knuckles": d.knuckle_gap_mm,
+        "pocket, wide": d.pocket_width_mm,
+        "pocket, deep": d.pocket_depth_mm,
+        "pocket, high": d.pocket_height_mm,
+        "bump": d.detent_mm,
+        "thinnest wall": d.min_wall_mm,
+    }
+    for i, (name, length) in enumerate(rows.items()):
+        axis.text(0.08, 0.95 - i / len(rows), name, fontsize=8)
+        axis.text(0.8, 0.95 - i / len(rows), f"{length:.2f}", fontsize=8, ha="right")
+    axis.set_title("mm, fdm", fontsize=9)
+    axis.axis("off")
+
+
+def about_x(degrees: float) -> Floats:
+    """(4, 4): a turn about the x axis."""
+    angle, motion = np.radians(degrees), np.eye(4)
+    motion[1:3, 1:3] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    return motion
+
+
+def cut(axis: Axes, solid: Solid, tint: Floats) -> None:
+    """The section of a solid at z = 0, its holes left white."""
+    for polygon in sorted(solid.cross_section(0.0), key=lambda p: -abs(signed_area(p))):
+        face = tint if signed_area(polygon) > 0 else "white"
+        axis.fill(*polygon.T, facecolor=face, edgecolor="0.15", lw=0.5)
+
+
+def signed_area(polygon: Floats) -> float:
+    """Positive where the corners run counter-clockwise."""
+    x, y = polygon.T
+    return float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2)
 
 
 def read_stl(path: Path) -> TriMesh:
@@ -524,6 +656,7 @@ FUNCTIONS = (
     walk,
     convergence,
     parts,
+    joint,
     thickening,
     choices,
     rigid,

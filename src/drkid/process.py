@@ -2,7 +2,7 @@
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -10,7 +10,6 @@ from drkid.errors import SpecError
 
 Length = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Extent = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-ProcessName = Literal["fdm", "sla", "polyjet", "injection"]
 
 BASE = "based_on"  # in a file: the known process whose values stand for those that the file does not name
 

@@ -1,7 +1,8 @@
+import numpy as np
 import pytest
 
 from drkid.errors import FitError
-from drkid.parts.dimensions import deepest_bevel_mm, half_width_mm, proposed, reach_mm
+from drkid.parts.dimensions import deepest_bevel_mm, half_width_mm, proposals, proposed, reach_mm
 from drkid.spec import PROCESSES, KitSpec
 
 # published smallest thickness per process, mm
@@ -43,7 +44,8 @@ def test_too_thin_is_refused_with_both_thicknesses(connector) -> None:
     needed = proposed(KitSpec(connector=connector), 40.0)
     with pytest.raises(FitError) as caught:
         proposed(KitSpec(connector=connector, thickness_mm=3.0), 40.0)
-    least = needed.pocket_height_mm + 2 * needed.min_wall_mm
+    leaning = np.cos(np.radians(needed.key_bend_degrees / 2))
+    least = needed.pocket_height_mm / leaning + 2 * needed.min_wall_mm
     assert f"{least:.2f}" in caught.value.wanted
     assert caught.value.found == "3"
     assert "rod" in caught.value.remedy
@@ -68,3 +70,17 @@ def test_sharp_joints_get_a_longer_grip_only_when_they_need_it() -> None:
     depth = [proposed(KitSpec(), bend).pocket_depth_mm for bend in (0.0, 90.0, 110.0, 140.0, 170.0)]
     assert depth[0] == depth[1] == depth[2] < depth[3]
     assert depth[3] == depth[4]
+
+
+def test_a_hinge_is_proposed_for_every_rod_and_number_of_knuckles() -> None:
+    found = proposals(KitSpec(), 40.0)
+    assert {(d.rod_diameter_mm, d.knuckles) for d in found} == {(r, n) for r in (1.75, 2.0, 3.0) for n in (2, 4, 6, 8)}
+    assert found[0] == proposed(KitSpec(), 40.0)
+    thin = proposals(KitSpec(thickness_mm=7.2), 40.0)
+    assert {d.rod_diameter_mm for d in thin} == {1.75, 2.0}
+
+
+def test_a_snap_has_a_pin_and_no_rod() -> None:
+    d = proposed(KitSpec(connector="snap"), 40.0)
+    assert d.rod_diameter_mm == d.rod_length_mm == 0
+    assert d.barrel_diameter_mm == pytest.approx(d.pin_diameter_mm + 2 * (d.rod_clearance_mm + d.min_wall_mm))

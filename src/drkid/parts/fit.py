@@ -38,8 +38,9 @@ class Margin:
 def margins(triangle: Floats, prismoid: Prismoid, dimensions: Dimensions) -> Iterator[Margin]:
     """Every length of a piece that must not fall short: triangle (3, 2), the piece around it, its pockets.
 
-    Exact: pockets are convex polygons at every height, and the distances between them and to the bevels change
-    linearly between the inner face, the bevels' ridge and the pockets' roof.
+    Exact, but for grooves, around which a convex outline is drawn: pockets are convex polygons at every height, and
+    the distances between them and to the bevels change linearly between the inner face, the bevels' ridge and the
+    pockets' roof.
     """
     low, high = prismoid.heights_mm
     least = max(dimensions.min_wall_mm, dimensions.thickness_mm / 2)
