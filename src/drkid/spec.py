@@ -44,7 +44,7 @@ EXACT_TOLERANCE, LARGE_TOLERANCE, PRESSURE_TOLERANCE = 0.1, 1.0, 1.5  # in perce
 UNIVERSAL = (32.0, 37.5)
 """Two edge lengths in mm of which every organic shape can be built: ratio 1.17, room for every process's connectors."""
 
-UNIVERSAL_BEVEL = (92.0, 105.0)
+UNIVERSAL_BEVEL = (100.0, 107.0)
 """Concave and convex bends in degrees that pieces of given lengths are bevelled for: they then fit any shape."""
 
 FOLLOWING = ("bisector", "flippable")  # thickenings whose bevels follow the bends of the surface
