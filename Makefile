@@ -55,6 +55,7 @@ benchmarks: $(VENV)/.run
 	$(BIN)/python benchmarks/paper_table.py
 	$(BIN)/python benchmarks/pressure_choices.py
 	$(BIN)/python benchmarks/congruence.py --classes 2
+	$(BIN)/python benchmarks/remesh.py
 
 clean:
 	rm -rf $(VENV) demo-kit .pytest_cache .ruff_cache .hypothesis .coverage

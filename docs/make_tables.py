@@ -2,8 +2,8 @@
 
     python docs/make_tables.py [NAME ...]
 
-`paper` and `choices` come from benchmarks/results; the others are made anew, from the bundled nucleus, by the examples
-and the command line.
+`paper`, `choices`, `congruence` and `remesh` come from benchmarks/results; the others are made anew, from the bundled
+nucleus, by the examples and the command line.
 """
 
 import contextlib
@@ -164,6 +164,24 @@ def _median(values: list[float | None], form: str) -> str:
     return format(median(there), form) if there else "–"
 
 
+def remesh() -> str:
+    """Remeshers beside one another, medians by number of vertices."""
+    rows = json.loads((RESULTS / "remesh.json").read_text())
+    printed = []
+    for count in sorted({r["count"] for r in rows}):
+        some = [r for r in rows if r["count"] == count]
+        for tool in ("drkid", *some[0]["peers"]):
+            found = [r["drkid"] if tool == "drkid" else r["peers"][tool] for r in some]
+            right = [f for f in found if f.get("right")]
+            forms = {"spread_percent": ".1f", "smallest_angle_degrees": ".0f", "irregular_percent": ".0f"}
+            forms |= {"outside_567_percent": ".1f", "mean_percent": ".3f", "max_percent": ".2f"}
+            forms |= {"volume_percent": "+.2f", "seconds": ".1f", "peak_memory_mb": ".0f"}
+            figures = [_median([f[name] for f in right], form) for name, form in forms.items()]
+            printed.append([str(count), tool, f"{sum(f.get('exact', False) for f in found)} of {len(some)}", *figures])
+    head = ["V", "remesher", "exact V", "edges: std/mean %", "smallest angle °", "valence ≠ 6 %", "not 5, 6, 7 %"]
+    return table([*head, "mean distance %", "largest %", "volume %", "s", "MB"], printed)
+
+
 def choices() -> str:
     """What the open choices do."""
     rows = []
@@ -281,7 +299,7 @@ def thickening() -> str:
 
 TABLES = {
     made.__name__: made
-    for made in (paper, choices, congruence, faces, classes, processes, density, make, inspect, thickening)
+    for made in (paper, choices, congruence, remesh, faces, classes, processes, density, make, inspect, thickening)
 }
 
 

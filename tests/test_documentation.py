@@ -109,6 +109,7 @@ def test_toml_is_a_spec(text):
         ("paper", "comparison-with-the-paper.md"),
         ("choices", "comparison-with-the-paper.md"),
         ("congruence", "palette-solver.md"),
+        ("remesh", "mathematics.md"),
     ],
 )
 def test_tables_are_those_of_the_benchmarks(name, file):

@@ -153,30 +153,36 @@ def _integrate(polygons: Floats, here: int, count: int, sites: Floats, i: int, c
 
 
 @njit(cache=True)
+def _squared_distance(points: Floats, i: int, sites: Floats, j: int) -> float:
+    x, y, z = points[i, 0] - sites[j, 0], points[i, 1] - sites[j, 1], points[i, 2] - sites[j, 2]
+    return x * x + y * y + z * z
+
+
+@njit(cache=True)
+def _nearer(middles: Floats, f: int, sites: Floats, near: Ints, apart: Floats, g: int) -> tuple[int, bool]:
+    # The nearest among seed g and its neighbours, and whether no other seed can be nearer: one that is lies within
+    # twice g's distance of g.
+    best, least = g, _squared_distance(middles, f, sites, g)
+    radius = 4 * least
+    for k in range(near.shape[1]):
+        if apart[g, k] > radius:
+            return best, True
+        squared = _squared_distance(middles, f, sites, near[g, k])
+        if squared < least:
+            best, least = near[g, k], squared
+    return best, near.shape[1] == len(sites) - 1
+
+
+@njit(cache=True)
 def _nearest(middles: Floats, sites: Floats, near: Ints, apart: Floats, first: Ints) -> bool:
-    # The seed nearest to each point, where `first` is a guess, in place. A seed nearer to the point than its guess g
-    # lies within twice that distance of g: the list of g's neighbours ends the search. False where it is too short.
+    # The seed nearest to each point, where `first` is a guess, in place. False where lists of neighbours are too short.
     for f in range(len(middles)):
-        while True:
-            g = first[f]
-            best, least, sure = g, 0.0, near.shape[1] == len(sites) - 1
-            for d in range(3):
-                least += (middles[f, d] - sites[g, d]) ** 2
-            radius = 4 * least
-            for k in range(near.shape[1]):
-                if apart[g, k] > radius:
-                    sure = True
-                    break
-                j, squared = near[g, k], 0.0
-                for d in range(3):
-                    squared += (middles[f, d] - sites[j, d]) ** 2
-                if squared < least:
-                    best, least = j, squared
-            first[f] = best
-            if best == g and not sure:
+        sure = False
+        while not sure:
+            best, sure = _nearer(middles, f, sites, near, apart, first[f])
+            if best == first[f] and not sure:
                 return False
-            if sure:
-                break
+            first[f] = best
     return True
 
 

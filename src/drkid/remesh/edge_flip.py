@@ -44,7 +44,7 @@ def flip_edge(origin: Ints, twin: Ints, start: Ints, h: int) -> None:
 
 @njit(cache=True)
 def is_harmless(origin: Ints, twin: Ints, vertices: Floats, h: int) -> bool:
-    # No fold, no sliver, no sharp ridge that was not there before.
+    """Does flipping the edge of half-edge h make no fold, no sliver and no sharp ridge that was not there before?"""
     g = twin[h]
     a, b, c, d = origin[h], origin[g], origin[preceding(h)], origin[preceding(g)]
     old, older = normal(vertices, a, b, c), normal(vertices, b, a, d)

@@ -37,7 +37,7 @@ UNEVEN = 0.2  # standard deviation of the edges over their mean, above which the
 
 
 def simplify(surface: Surface, spec: KitSpec, progress: Progress = silent) -> Simplified:
-    """M_s: a closed manifold mesh of exactly `spec.vertex_count(genus)` vertices, as near to the surface M_i as they get.
+    """M_s: a closed manifold mesh of exactly `spec.vertex_count(genus)` vertices, near the surface M_i.
 
     A centroidal Voronoi tessellation places the vertices and its dual joins them (Yan et al. 2009). Where cells are no
     disks, as on parts thinner than an edge, seeds are added until the dual is right, and edges collapsed down to the

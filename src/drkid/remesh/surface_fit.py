@@ -16,9 +16,10 @@ from drkid.mesh import Floats, Ints, TriMesh
 from drkid.remesh.closest_point import ClosestPoint
 from drkid.remesh.tangential_relaxation import moved_where_harmless
 
-CLOSENESS = 4.0  # of squared distances against squared errors of edges: more costs evenness and narrows angles
-PEAK = 0.25  # how much more a distance of the root mean square weighs than none: more lowers the largest one
-PEAK_EDGE = 0.5  # the same of an edge's error: more widens the narrowest angles
+CLOSENESS = 3.0  # of squared distances against squared errors of edges: more costs evenness and narrows angles
+PEAK = 0.2  # how much more a distance of the root mean square weighs than none: more lowers the largest one
+MOST_PEAK = 10.0  # mean squares: a tip that no vertex can reach is not to bend its surroundings
+PEAK_EDGE = 0.3  # the same of an edge's error: more widens the narrowest angles
 DAMPING = 0.02  # of a step, in units of the springs; without it, vertices slide where the surface is flat
 REACH = 0.3  # most of a mean edge that a vertex moves in a step: beyond it the closest points are others
 SOLVED, MOST_SOLVER_STEPS = 1e-6, 60  # squared residual, against that of no step, at which the solver stops
@@ -86,6 +87,8 @@ def _diagonal(system: System, count: int) -> Floats:
         for d in range(3):
             found[edges[e, 0], d] += stiffness[e] * along[e, d] ** 2
             found[edges[e, 1], d] += stiffness[e] * along[e, d] ** 2
+    for v in range(count):
+        found[v] = found[v].sum() / 3  # the trace does not depend on the axes, so that steps turn with the mesh
     return found
 
 
@@ -141,7 +144,8 @@ class SurfaceFit:
         parts = self._from_mesh(mesh), self._from_surface(mesh)
         pairs = Points(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
         squares = pairs.away**2
-        raised = 1 + PEAK * squares / max(float((pairs.share * squares).sum()) / 2, np.finfo(float).tiny)
+        mean_square = max(float((pairs.share * squares).sum()) / 2, np.finfo(float).tiny)
+        raised = 1 + PEAK * np.minimum(squares / mean_square, MOST_PEAK)
         share = CLOSENESS / 2 * pairs.share * raised
         matrix, gradient = _accumulate(len(mesh.faces), pairs, share)
         right = np.zeros_like(mesh.vertices)

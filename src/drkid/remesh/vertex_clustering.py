@@ -16,8 +16,9 @@ def clustered(mesh: TriMesh, count: int) -> TriMesh:
     """
     if len(mesh.faces) <= count:
         return mesh
-    axes = np.linalg.svd(mesh.vertices - mesh.vertices.mean(axis=0), full_matrices=False)[2]
-    along = mesh.vertices @ axes.T
+    centred = mesh.vertices - mesh.vertices.mean(axis=0)
+    along = centred @ np.linalg.eigh(centred.T @ centred)[1]
+    along *= np.where((along**3).sum(axis=0) < 0, -1, 1)  # so that the cubes go with the mesh when it turns
     side = np.sqrt(2 * mesh.areas.sum() / count)
     place = np.floor((along - along.min(axis=0)) / side).astype(np.int64)
     sizes = place.max(axis=0) + 1
