@@ -78,7 +78,8 @@ def test_render_writes_a_picture_and_says_what_colours_mean(kit_folder, tmp_path
     ]
     assert run(arguments) == 0
     assert "% of the mean edge" in capsys.readouterr().out
-    assert Image.open(path).size == (120, 80)
+    with Image.open(path) as image:
+        assert image.size == (120, 80)
 
 
 @pytest.mark.parametrize(

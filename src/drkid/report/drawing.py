@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from functools import cache
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from drkid.mesh import Floats
 
@@ -107,7 +107,8 @@ def _channels(code: str) -> tuple[float, float, float]:
 def _pdf_word(canvas: "Canvas", item: Word) -> None:
     font, base = "Helvetica-Bold" if item.bold else "Helvetica", item.y - BASELINE * item.size
     start = item.x - canvas.stringWidth(item.text, font, item.size) / 2
-    modes = [(1, item.halo), (0, item.colour)] if item.halo else [(0, item.colour)]
+    modes: list[tuple[Literal[0, 1], str]] = [(1, item.halo)] if item.halo else []
+    modes.append((0, item.colour))
     for mode, colour in modes:  # outlines first, then the letters on them
         text = canvas.beginText(start, base)
         text.setFont(font, item.size)

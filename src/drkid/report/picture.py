@@ -129,7 +129,7 @@ def _hollows(depth: Floats, faces: Ints, size: float) -> Floats:
         )
         total += np.clip((around - here) / (3 * sigma * OVERSAMPLING), 0, 1) / len(HOLLOWS)
     shadow = np.where(seen > 0, np.minimum(1.6 * total, 1), 0.0)
-    return np.kron(shadow, np.ones((OVERSAMPLING, OVERSAMPLING)))
+    return np.asarray(np.kron(shadow, np.ones((OVERSAMPLING, OVERSAMPLING))), np.float64)
 
 
 def _averaged(fine: Floats) -> Floats:

@@ -66,7 +66,7 @@ class Scene:
         wanted = [self.document.classes[i].edge_lengths for i in self.piece_class]
         found = [_sides(self.assembled.vertices[list(piece.corners)]) for piece in self.document.pieces]
         errors = [np.linalg.norm(np.sort(a) - b) for a, b in zip(found, wanted, strict=True)]
-        return read_only(100 / self.document.metrics.mean_edge * np.array(errors))
+        return read_only(100 / self.document.metrics.mean_edge * np.array(errors, np.float64))
 
     @cached_property
     def bend_degrees(self) -> Floats:
