@@ -98,11 +98,27 @@ def show_kit(kit: "Kit", folder: "Path", seconds: float) -> None:
         "size": f"{size} mm, edges {metrics.mean_edge:.1f} mm, {kit.part_set.dimensions.thickness_mm:g} mm thick",
         "grooves": f"{metrics.groove_mean_mm:.2g} mm mean, {metrics.groove_max_mm:.2g} mm max",
         "rigidity": _rigidity(metrics.rigidity, metrics.mean_edge),
+        **_cost(kit),
         "solver": f"{outcome.status}: {outcome.message}",
         "time": f"{seconds:.1f} s",
         "kit": str(folder),
     }
     _show_rows(console, rows)
+
+
+def _cost(kit: "Kit") -> dict[str, str]:
+    """What printing costs, and from how many kits on moulds pay; nothing without prices."""
+    from drkid.export import kit_costs  # noqa: PLC0415 — slow to import
+
+    cost, compared = kit_costs(kit)
+    if cost is None:
+        return {}
+    text = f"{cost:.2f} printed"
+    if compared is not None:
+        text += f", {compared.moulded_kit_cost:.2f} moulded; {compared.moulds} moulds for {compared.moulds_cost:.2f} "
+        kits = compared.break_even_kits
+        text += "never pay" if kits is None else f"pay from {kits} kits on"
+    return {"cost": text}
 
 
 def _rigidity(found: "Rigidity | None", mean_edge_mm: float) -> str:
