@@ -36,6 +36,7 @@ from drkid.congruence.palette import Palette, palette_of_classes
 from drkid.congruence.quadratic_model import connectivity, quadratic_model
 from drkid.congruence.target import Target
 from drkid.export.colour import CONNECTOR_COLOUR, class_colour
+from drkid.export.plates import plates as build_plates
 from drkid.kit import Dimensions, Part
 from drkid.mesh import Bools, Floats, TriMesh
 from drkid.parts import make_parts
@@ -48,6 +49,7 @@ from drkid.parts.pocket import pocket, side_frames
 from drkid.parts.prismoid import bevelled
 from drkid.parts.snap import snap_half
 from drkid.report.colouring import channels as colour
+from drkid.report.net import net_of
 from drkid.report.picture import Body, camera, render
 from drkid.solid import Solid
 
@@ -204,6 +206,46 @@ def parts() -> None:
         render(*joined(made, half), 420),
     )
     row("parts.png", pictures, ("a piece from outside", "from inside: three pockets", "a hinge half", "a joint"))
+
+
+def plates() -> None:
+    """A full plate of pieces and the first one of hinge halves, as they lie on the bed."""
+    made = build_plates(nucleus_kit())
+    pictures = []
+    for plate in (made[0], next(p for p in made if p.objects[0].colour == CONNECTOR_COLOUR)):
+        bodies = [
+            Body(carried(one.mesh, np.asarray(transform)), colour(one.colour))
+            for one in plate.objects
+            for transform in one.transforms
+        ]
+        pictures.append(render(bodies, camera(-80, 60), 620))
+    row("plates.png", pictures, ("pieces of one class", "hinge halves"))
+
+
+def coupon() -> None:
+    """The fit coupon as it lies on the bed."""
+    body = nucleus_kit().part_set.coupon
+    assert body is not None
+    bodies = [Body(body.mesh(), colour(CONNECTOR_COLOUR))]
+    pictures = [render(bodies, view, 620) for view in (camera(-90, 89), camera(-70, 45))]
+    row("coupon.png", pictures, ("from above", "as it is printed"))
+
+
+def net() -> None:
+    """The first page of the net, as the PDF has it."""
+    made = net_of(nucleus_kit())
+    figure, axis = plt.subplots(figsize=(6, 6 * made.size_mm[1] / made.size_mm[0]))
+    page, dashes = made.pages[0], {"mountain": "--", "valley": "-.", "flat": ":", "cut": "-"}
+    for tab in page.tabs:
+        axis.fill(*tab.T, fill=False, ec="#888888", lw=0.5)
+    for face in page.faces:
+        axis.fill(*face.outline.T, color=class_colour(face.class_index), alpha=0.45, lw=0)
+    for line in page.lines:
+        axis.plot(*np.stack([line.start, line.end]).T, dashes[line.kind], c="k", lw=0.8)
+    for label in page.labels:
+        axis.text(*label.at, label.text, size=1.9 * label.height, ha="center", va="center")
+    axis.set(xlim=(0, made.size_mm[0]), ylim=(0, made.size_mm[1]), aspect="equal", xticks=[], yticks=[])
+    written(figure, "net.png")
 
 
 def joined(made: Kit, half: TriMesh) -> tuple[list[Body], Floats]:
@@ -657,6 +699,9 @@ FUNCTIONS = (
     convergence,
     parts,
     joint,
+    plates,
+    coupon,
+    net,
     thickening,
     choices,
     rigid,

@@ -102,6 +102,7 @@ def show_kit(kit: "Kit", folder: "Path", seconds: float) -> None:
         "grooves": f"{metrics.groove_mean_mm:.2g} mm mean, {metrics.groove_max_mm:.2g} mm max",
         "rigidity": _rigidity(metrics.rigidity, metrics.mean_edge),
         "assembly": _assembly(metrics.assembly),
+        **_cost(kit),
         "solver": f"{outcome.status}: {outcome.message}",
         "time": f"{seconds:.1f} s",
         "kit": str(folder),
@@ -114,6 +115,21 @@ def _moulds(metrics: "Metrics") -> str:
     connectors = metrics.unique_connector_parts
     beside = f" and {connectors} of connectors" if connectors else ""
     return f"{metrics.unique_piece_parts} moulds{beside}"
+
+
+def _cost(kit: "Kit") -> dict[str, str]:
+    """What printing costs, and from how many kits on moulds pay; nothing without prices."""
+    from drkid.export import kit_costs  # noqa: PLC0415 — slow to import
+
+    cost, compared = kit_costs(kit)
+    if cost is None:
+        return {}
+    text = f"{cost:.2f} printed"
+    if compared is not None:
+        text += f", {compared.moulded_kit_cost:.2f} moulded; {compared.moulds} moulds for {compared.moulds_cost:.2f} "
+        kits = compared.break_even_kits
+        text += "never pay" if kits is None else f"pay from {kits} kits on"
+    return {"cost": text}
 
 
 def _rigidity(found: "Rigidity | None", mean_edge_mm: float) -> str:

@@ -3,6 +3,7 @@ from dataclasses import replace
 import pytest
 
 from drkid.export.bill_of_materials import connector_row, moulding, piece_row, rod_row, spare_count
+from drkid.export.kit_document import kit_summary
 from drkid.spec import KitSpec
 
 
@@ -62,3 +63,11 @@ def test_spares_cost_nothing_in_the_comparison():
     plain = KitSpec(price_per_kg=300, mould_price=2500)
     spare = plain.model_copy(update={"spares": "50%"})
     assert moulding(rows_of(plain), plain) == replace(moulding(rows_of(spare), spare))
+
+
+def test_the_summary_has_costs_where_prices_are_given(kit):
+    assert "cost" not in kit_summary(kit)
+    priced = replace(kit, spec=kit.spec.model_copy(update={"price_per_kg": 30.0, "mould_price": 1000.0}))
+    found = kit_summary(priced)["cost"]
+    assert found["printed"] == pytest.approx(found["moulding"]["printed_kit_cost"])  # no spares
+    assert found["moulding"]["moulds"] == len(kit.part_set.parts) + 1

@@ -2,6 +2,6 @@
 
 from drkid.export.document import KitDocument
 from drkid.export.folder import require_writable, write_kit
-from drkid.export.kit_document import kit_summary
+from drkid.export.kit_document import kit_costs, kit_summary
 
-__all__ = ["KitDocument", "kit_summary", "require_writable", "write_kit"]
+__all__ = ["KitDocument", "kit_costs", "kit_summary", "require_writable", "write_kit"]

@@ -8,7 +8,7 @@ import numpy as np
 
 from drkid import __version__
 from drkid.export import document as doc
-from drkid.export.bill_of_materials import Row, connector_row, piece_row, rod_row
+from drkid.export.bill_of_materials import Moulding, Row, connector_row, moulding, piece_row, rod_row
 from drkid.export.layout import connector_file, part_file
 from drkid.export.stl import rounded
 from drkid.kit import Distance, Kit, Metrics, Part, class_id
@@ -71,9 +71,13 @@ def kit_document(kit: Kit) -> doc.KitDocument:
 
 
 def kit_summary(kit: Kit) -> dict[str, Any]:
-    """What `make --json` prints of a kit: source, parameters, metrics, outcome and notes, as in kit.json."""
+    """What `make --json` prints of a kit: source, parameters, metrics, outcome and notes, as in kit.json; the costs."""
     document = kit_document(kit).model_dump(mode="json", by_alias=True, exclude_none=True)
-    return {name: document[name] for name in ("source", "spec", "metrics", "outcome", "notes")}
+    summary = {name: document[name] for name in ("source", "spec", "metrics", "outcome", "notes")}
+    cost, compared = kit_costs(kit)
+    if cost is not None:
+        summary["cost"] = {"printed": cost, "moulding": None if compared is None else asdict(compared)}
+    return summary
 
 
 def bom_rows(kit: Kit, volumes_mm3: dict[str, float]) -> list[Row]:
@@ -89,6 +93,13 @@ def bom_rows(kit: Kit, volumes_mm3: dict[str, float]) -> list[Row]:
         else:
             rows.append(rod_row(item.diameter or 0.0, item.length or 0.0, item.count, spec))
     return rows
+
+
+def kit_costs(kit: Kit) -> tuple[float | None, Moulding | None]:
+    """What printing everything costs, spares included, and the comparison with moulding; None without prices."""
+    rows = bom_rows(kit, {name: mesh.volume for name, mesh in printed_meshes(kit).items()})
+    costs = [row.total_cost for row in rows if row.total_cost is not None]
+    return (sum(costs) if costs else None), moulding(rows, kit.spec)
 
 
 def printed_meshes(kit: Kit) -> dict[str, TriMesh]:
