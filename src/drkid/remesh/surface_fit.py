@@ -6,7 +6,7 @@ surface is inside it; the least squares lift it until it lies on both sides, whi
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -142,7 +142,8 @@ class SurfaceFit:
         turn by 90° or become a sliver or a fold.
         """
         parts = self._from_mesh(mesh), self._from_surface(mesh)
-        pairs = Points(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+        joined: list[Any] = [np.concatenate(arrays) for arrays in zip(*parts, strict=True)]
+        pairs = Points(*joined)
         squares = pairs.away**2
         mean_square = max(float((pairs.share * squares).sum()) / 2, np.finfo(float).tiny)
         raised = 1 + PEAK * np.minimum(squares / mean_square, MOST_PEAK)

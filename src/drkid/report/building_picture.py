@@ -63,7 +63,7 @@ class Builder:
         """(P,): area of each piece's outer face."""
         corners, piece, outer = self._fans
         area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-        return np.bincount(piece[outer], weights=area[outer], minlength=len(self._placed))
+        return np.bincount(piece[outer], weights=area[outer], minlength=len(self._placed)).astype(np.float64)
 
     # ---- where to look from
 

@@ -170,7 +170,7 @@ def overlapping(bodies: Floats, others: Floats, touching: float) -> Bools:
     if not len(others):
         return np.zeros(0, np.bool_)
     apart = np.maximum(_separation(bodies, others), _separation(others, bodies).T)
-    return (apart < -touching).any(axis=0)
+    return np.asarray((apart < -touching).any(axis=0))
 
 
 def _separation(a: Floats, b: Floats) -> Floats:
