@@ -159,7 +159,8 @@ def glide(mesh: TriMesh, sweeps: int, heat: float, rng: np.random.Generator) -> 
     halves = halves[halves < edges.twin]
     for left in range(sweeps - 1, -1, -1):
         heats = heat * left / sweeps * rng.exponential(size=len(halves))
-        kept = _glide((edges.origin, edges.twin, edges.start), vertices, normals, mesh.mean_edge, rng.permutation(halves), heats)
+        order = rng.permutation(halves)
+        kept = _glide((edges.origin, edges.twin, edges.start), vertices, normals, mesh.mean_edge, order, heats)
         if kept == 0:
             break
     return mesh_of(edges, vertices)
