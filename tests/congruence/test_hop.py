@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -84,18 +86,23 @@ def test_a_cold_anneal_is_made_hotter_until_something_changes(problem, soft):
         found = annealed(start_again, problem, Anneal(0.3, 0.05, heat, 3000), np.random.default_rng(0))
         return bool((found.labels != start_again.labels).any() or (found.mesh.faces != start_again.mesh.faces).any())
 
-    start_again = annealed(soft, problem, Anneal(0.3, 0.05, 1e-9, 60_000), np.random.default_rng(0))
+    start_again = soft  # each anneal moves the vertices, which may make further changes worth it
+    for seed in range(20):
+        before = start_again
+        start_again = annealed(before, problem, Anneal(0.3, 0.05, 1e-9, 60_000), np.random.default_rng(seed))
+        if (start_again.labels == before.labels).all() and (start_again.mesh.faces == before.mesh.faces).all():
+            break
     assert not changed(1e-9)
     assert changed(1.7 ** (1 - REHEATS))
 
 
 def test_an_anneal_ends_where_its_model_is_at_rest(problem, soft):
-    """At the vertices that come out the linear model of the lengths and offsets has no force left."""
+    """The vertices that come out lie much nearer to the rest of the new labels' model than those that went in."""
     how = Anneal(0.3, 0.05, 0.5, 4000)
     found = annealed(soft, problem, how, np.random.default_rng(1))
-    model = quadratic_model(found, problem.target, how.weight, how.damping)
-    before = quadratic_model(soft, problem.target, how.weight, how.damping)
-    assert np.linalg.norm(model.shift) < 0.7 * np.linalg.norm(before.shift) + 0.05
+    unmoved = replace(found, mesh=found.mesh.moved(soft.mesh.vertices))
+    after, before = (quadratic_model(f, problem.target, how.weight, how.damping) for f in (found, unmoved))
+    assert np.linalg.norm(after.shift) < 0.5 * np.linalg.norm(before.shift)
 
 
 def test_drawn_anneals_lie_in_their_ranges():

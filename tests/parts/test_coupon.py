@@ -30,7 +30,7 @@ def test_clearances_tried_ascend_around_the_chosen_one():
 def test_two_half_pieces_and_five_pairs_of_halves_lie_on_the_bed(process):
     spec = KitSpec(process=process)
     dimensions = proposed(spec, SHARPEST)
-    body = coupon(dimensions, spec, SHARPEST)
+    body = coupon(dimensions, spec)
     assert body.mesh().is_closed_manifold
     parts = sorted(bodies(body), key=lambda part: part.volume)
     assert len(parts) == 12
@@ -45,7 +45,7 @@ def test_two_half_pieces_and_five_pairs_of_halves_lie_on_the_bed(process):
 def test_every_pocket_gives_the_half_its_stated_clearance():
     spec = KitSpec()
     dimensions = proposed(spec, SHARPEST)
-    half = hinge_half(dimensions, SHARPEST).solid
+    half = hinge_half(dimensions).solid
     block = Solid.box((-20, SIDE_GAP_MM, -dimensions.thickness_mm / 2), (20, 20, dimensions.thickness_mm / 2))
     for value in tried_mm(dimensions.clearance_mm):
         piece = block - pocket(with_clearance(dimensions, value))
@@ -55,11 +55,11 @@ def test_every_pocket_gives_the_half_its_stated_clearance():
 def test_the_bars_of_the_coupon_take_a_half_in_the_chosen_pocket():
     spec = KitSpec()
     dimensions = proposed(spec, SHARPEST)
-    bar = max(bodies(coupon(dimensions, spec, SHARPEST)), key=lambda part: (round(part.volume, 3), -part.bounds[0, 1]))
+    bar = max(bodies(coupon(dimensions, spec)), key=lambda part: (round(part.volume, 3), -part.bounds[0, 1]))
     low, high = bar.bounds
     frame = np.diag([1.0, -1.0, -1.0, 1.0])  # outer face down
     frame[:3, 3] = (low[0] + high[0]) / 2, high[1] + SIDE_GAP_MM, dimensions.thickness_mm / 2
-    half = hinge_half(dimensions, SHARPEST).solid.moved(frame)
+    half = hinge_half(dimensions).solid.moved(frame)
     assert bar.gap(half, 1.0) == pytest.approx(dimensions.clearance_mm, abs=1e-3)
 
 
@@ -67,17 +67,17 @@ def test_bores_differ_by_their_rod_clearance():
     spec = KitSpec()
     dimensions = proposed(spec, SHARPEST)
     wide = replace(dimensions, rod_clearance_mm=tried_mm(dimensions.rod_clearance_mm)[-1])
-    volumes = sorted(round(part.volume, 4) for part in bodies(coupon(dimensions, spec, SHARPEST)))[:10]
+    volumes = sorted(round(part.volume, 4) for part in bodies(coupon(dimensions, spec)))[:10]
     assert volumes[::2] == volumes[1::2]  # pairs
     assert len(set(volumes)) == 5
-    assert hinge_half(wide, SHARPEST).solid.volume < hinge_half(dimensions, SHARPEST).solid.volume
+    assert hinge_half(wide).solid.volume < hinge_half(dimensions).solid.volume
 
 
 def test_a_key_is_tried_in_the_pockets_and_without_connectors_there_is_no_coupon():
     spec = KitSpec(connector="box")
-    assert len(bodies(coupon(proposed(spec, SHARPEST), spec, SHARPEST))) == 3
+    assert len(bodies(coupon(proposed(spec, SHARPEST), spec))) == 3
     plain = KitSpec(connector="none")
-    assert coupon(proposed(plain, SHARPEST), plain, SHARPEST) is None
+    assert coupon(proposed(plain, SHARPEST), plain) is None
 
 
 @pytest.mark.parametrize("figure", SEGMENTS)

@@ -20,6 +20,7 @@ from drkid.spec import KitSpec
 from drkid.surface.bodies import outermost, signed_volumes
 from drkid.surface.welding import welded
 
+STL_HEADER, STL_TRIANGLE = 84, 50  # bytes of a binary STL
 FLAT_DIAGONALS = 1e-9  # a face whose altitude is below this times the diagonal has no direction
 
 _FAULTS: tuple[type[Exception], ...] = (
@@ -81,6 +82,8 @@ def _loaded(path: Path, suffix: str) -> tuple[Floats, Ints]:
     try:
         mesh: Any = trimesh.load(path, file_type=suffix[1:], process=False, force="mesh", skip_materials=True)
         vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
+        if suffix == ".stl" and not len(faces):
+            _require_whole_stl(path.read_bytes())
     except _FAULTS as error:
         raise InputError(
             f"{path.name} cannot be read as a mesh",
@@ -99,6 +102,16 @@ def _loaded(path: Path, suffix: str) -> tuple[Floats, Ints]:
     if bad:
         raise InputError(f"{path.name} has coordinates that are no numbers", found=f"{bad} of {len(vertices)} vertices")
     return vertices, faces
+
+
+def _require_whole_stl(content: bytes) -> None:
+    """A binary STL that is cut off is taken for a text without triangles where encodings are guessed."""
+    if content[:5].lower() == b"solid" or len(content) < STL_HEADER:
+        return
+    (count,) = struct.unpack_from("<I", content, STL_HEADER - 4)
+    if len(content) != STL_HEADER + STL_TRIANGLE * count:
+        message = f"{len(content)} bytes, where {count} triangles take {STL_HEADER + STL_TRIANGLE * count}"
+        raise ValueError(message)
 
 
 def _chosen_body(mesh: TriMesh, spec: KitSpec, name: str) -> tuple[TriMesh, int, int]:
