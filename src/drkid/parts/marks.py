@@ -20,6 +20,7 @@ TICK_LENGTHS = (3.0, 2.0)  # in stroke widths
 TICK_PITCH = 2.2  # from one tick to the next, in stroke widths
 APART = 2.0  # between the middles of a letter's and a tick's strokes, in stroke widths
 STEP_MM = 0.3  # between places that are tried
+MOST_PLACES = 4000  # that are tried for a letter: a large piece has many more, next to one another
 MOST_SHIFTS = 16.0  # how far from its pocket a tick may stand, in stroke widths
 SAMPLES = 0.5  # of a stroke's width between the points at which it is tested
 ROUND = 8  # corners of a stroke's end
@@ -151,6 +152,7 @@ def _letter(text: str, height_mm: float, ground: _Ground, width_mm: float) -> Fl
     places = ground.nodes[ground.room_mm.ravel() > -width_mm]
     if not len(places):
         return None
+    places = places[:: ceil(len(places) / MOST_PLACES)]
     room = ground.room_at(places[:, None] + _sampled(lines, width_mm)).min(axis=1)
     best = int(room.argmax())
     return lines + places[best] if room[best] > 0 else None
