@@ -18,6 +18,7 @@ SAMPLES = 1500  # on M_s; of the other mesh its vertices, edge middles and face 
 UNIT_MEAN_PERCENT, UNIT_MAX_PERCENT, UNIT_DEGREES, UNIT_CONCAVE_PERCENT = 0.5, 2.5, 4.0, 5.0
 
 UNIT_BEYOND_DEGREES = 1.0  # pieces of a fixed bevel do not go together at such a joint: nearly any other mesh is better
+REFUSED = 5.0  # what a mesh with a joint beyond the bevels adds: whatever else it is like, no kit is made of it
 
 
 @dataclass(frozen=True)
@@ -91,5 +92,5 @@ class Yardstick:
             + self.spec.weight_max * quality.max_percent / UNIT_MAX_PERCENT
             + self.spec.weight_dihedral * quality.excess_p95_degrees / UNIT_DEGREES
             + self.spec.weight_concave * quality.excess_concave_percent / UNIT_CONCAVE_PERCENT
-            + quality.beyond_degrees / UNIT_BEYOND_DEGREES
+            + (REFUSED + quality.beyond_degrees / UNIT_BEYOND_DEGREES if quality.beyond_degrees else 0.0)
         )
