@@ -9,6 +9,7 @@ its security radius; Liu et al., "On centroidal Voronoi tessellation: energy smo
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -224,10 +225,11 @@ def _restricted_voronoi(
 
 def is_compiled() -> bool:
     """Is machine code of the kernels kept from an earlier run, and newer than their source?"""
-    if _restricted_voronoi.signatures:
+    kernel: Any = _restricted_voronoi  # numba's dispatcher, which its stubs take for a plain function
+    if kernel.signatures:
         return True
     source = Path(__file__).stat().st_mtime
-    kept = Path(_restricted_voronoi.stats.cache_path).glob(f"*.{_restricted_voronoi.__name__}-*.nbi")
+    kept = Path(kernel.stats.cache_path).glob(f"*.{_restricted_voronoi.__name__}-*.nbi")
     return any(index.stat().st_mtime >= source for index in kept)
 
 
