@@ -225,11 +225,11 @@ def _restricted_voronoi(
 
 def is_compiled() -> bool:
     """Is machine code of the kernels kept from an earlier run, and newer than their source?"""
-    kernel: Any = _restricted_voronoi  # numba's dispatcher, which its stub hides
+    kernel: Any = _restricted_voronoi  # numba's dispatcher, which its stubs take for a plain function
     if kernel.signatures:
         return True
     source = Path(__file__).stat().st_mtime
-    kept = Path(kernel.stats.cache_path).glob(f"*.{kernel.__name__}-*.nbi")
+    kept = Path(kernel.stats.cache_path).glob(f"*.{_restricted_voronoi.__name__}-*.nbi")
     return any(index.stat().st_mtime >= source for index in kept)
 
 

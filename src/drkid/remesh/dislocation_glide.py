@@ -159,8 +159,9 @@ def glide(mesh: TriMesh, sweeps: int, heat: float, rng: np.random.Generator) -> 
     halves = halves[halves < edges.twin]
     for left in range(sweeps - 1, -1, -1):
         heats = heat * left / sweeps * rng.exponential(size=len(halves))
-        order = rng.permutation(halves)
-        kept = _glide((edges.origin, edges.twin, edges.start), vertices, normals, mesh.mean_edge, order, heats)
+        kept = _glide(
+            (edges.origin, edges.twin, edges.start), vertices, normals, mesh.mean_edge, rng.permutation(halves), heats
+        )
         if kept == 0:
             break
     return mesh_of(edges, vertices)

@@ -6,7 +6,7 @@ surface is inside it; the least squares lift it until it lies on both sides, whi
 """
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -141,9 +141,7 @@ class SurfaceFit:
         squared error of the edges, all in units of the mean edge. A vertex stays where it is if one of its faces would
         turn by 90° or become a sliver or a fold.
         """
-        parts = self._from_mesh(mesh), self._from_surface(mesh)
-        joined: list[Any] = [np.concatenate(arrays) for arrays in zip(*parts, strict=True)]
-        pairs = Points(*joined)
+        pairs = _joined(self._from_mesh(mesh), self._from_surface(mesh))
         squares = pairs.away**2
         mean_square = max(float((pairs.share * squares).sum()) / 2, np.finfo(float).tiny)
         raised = 1 + PEAK * np.minimum(squares / mean_square, MOST_PEAK)
@@ -186,6 +184,16 @@ class SurfaceFit:
 def surface_fit(closest: ClosestPoint, count: int, rng: np.random.Generator) -> SurfaceFit:
     """For meshes of `count` vertices."""
     return SurfaceFit(closest, sample(closest.surface, max(FEWEST_POINTS, POINTS * count), rng))
+
+
+def _joined(one: Points, two: Points) -> Points:
+    return Points(
+        np.concatenate([one.face, two.face]),
+        np.concatenate([one.weights, two.weights]),
+        np.concatenate([one.away, two.away]),
+        np.concatenate([one.direction, two.direction]),
+        np.concatenate([one.share, two.share]),
+    )
 
 
 def _signed(here: Floats, there: Floats, normals: Floats, rounding: float) -> tuple[Floats, Floats]:
