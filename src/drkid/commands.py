@@ -18,7 +18,7 @@ PALETTE = {"palette", "like", "multisets"}  # lengths and triangles from outside
 STALLED = 3  # exit status: the kit is written, but the asked tolerance was not reached
 NOT_AS_STATED = 1  # exit status of `check` for a kit whose files do not bear out its numbers
 TYPED_AS_TEXT = ("spacing", "bed_mm", "palette", "bevel_degrees")  # lists, which a person types as one word
-GROUPS = ("Input", "Mesh", "Congruence", "Pieces")  # in the order in which help shows them
+GROUPS = ("Input", "Mesh", "Congruence", "Pieces", "Patches")  # in the order in which help shows them
 
 # ---- flags from KitSpec
 

@@ -3,7 +3,7 @@ import pytest
 from exact_shapes import decomposed, geodesic, icosahedron, potato, sixths
 
 from drkid.kit import Decomposition
-from drkid.parts.class_triangle import laid_down, symmetries
+from drkid.class_triangle import laid_down, symmetries
 from drkid.parts.mean_normal import leaning, mean_normal_slopes
 from drkid.parts.members import members_of
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from drkid.assembly.order import steps
-from drkid.assembly.rigid_fit import rigid_fit
+from drkid.rigid_fit import rigid_fit
 from drkid.kit import Assembly, Joint, PartSet, Piece
 from drkid.measure import bend_radians
 from drkid.mesh import TriMesh, read_only
@@ -23,7 +23,7 @@ def assemble(mesh_mm: TriMesh, part_set: PartSet, progress: Progress = silent) -
     corners = np.stack([part.corners for part in part_set.parts])[part_set.face_part]
     transforms = read_only(rigid_fit(corners, mesh_mm.vertices[vertices]))
     pieces = tuple(
-        Piece(face, int(part_set.face_part[face]), (a, b, c), transforms[face])
+        Piece((face,), int(part_set.face_part[face]), (a, b, c), transforms[face])
         for face, (a, b, c) in enumerate(vertices.tolist())
     )
     bend = bend_radians(mesh_mm)

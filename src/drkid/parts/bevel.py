@@ -3,7 +3,7 @@
 import numpy as np
 
 from drkid.mesh import Floats
-from drkid.parts.class_triangle import equal_sides
+from drkid.class_triangle import equal_sides
 from drkid.parts.members import Members
 
 SHARPEST_JOINT_DEGREES = 140.0  # bends beyond this are served as if they were this sharp

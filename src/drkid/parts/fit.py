@@ -8,7 +8,7 @@ import numpy as np
 from drkid.errors import FitError
 from drkid.kit import Dimensions
 from drkid.mesh import Floats
-from drkid.parts.class_triangle import inward_normals
+from drkid.class_triangle import inward_normals
 from drkid.parts.prismoid import Prismoid, side_insets
 
 SCALE_TOLERANCE = 1e-5  # relative: the size is rounded up to whole mm afterwards

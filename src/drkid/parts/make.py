@@ -1,20 +1,23 @@
 """The one function of this stage."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from math import ceil, degrees
 
 import numpy as np
 
 from drkid.errors import FitError
-from drkid.kit import Connector, Decomposition, Dimensions, Part, PartSet, class_id
+from drkid.curved_patch import CurvedPatch
+from drkid.kit import Connector, Decomposition, Dimensions, Part, PartSet, Patches, class_id
 from drkid.mesh import Floats, Ints, read_only
-from drkid.parts.class_triangle import LEFT_CORNERS, is_mirror_symmetric, laid_down, printed_lengths
-from drkid.parts.dimensions import proposed
+from drkid.parts.curved_piece import curved_solid, needed_thickness_mm, raised
+from drkid.class_triangle import LEFT_CORNERS, is_mirror_symmetric, laid_down, printed_lengths
+from drkid.parts.dimensions import THICKNESS_STEP_MM, proposed
 from drkid.parts.fit import FITS_MM, Margin, margins, smallest_scale
 from drkid.parts.groove import groove_mm, recesses
 from drkid.parts.hinge import hinge_half
 from drkid.parts.key import box_key
+from drkid.parts.make_merged import merged_parts
 from drkid.parts.members import Members, members_of
 from drkid.parts.notes import notes
 from drkid.parts.pocket import pocket, side_frames
@@ -26,15 +29,19 @@ from drkid.spec import KitSpec
 MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 FIRST_GUESS_THICKNESSES = 4.0  # mean edge of the pieces with which the search for a size begins
 WHOLE_MM = 1e-6
+MOST_THICKENINGS = 8  # of curved pieces, each of which may need a larger size; two do
 
 
-def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress = silent) -> PartSet:
+def make_parts(
+    decomposition: Decomposition, spec: KitSpec, progress: Progress = silent, patches: Patches | None = None
+) -> PartSet:
     """The printed shapes of a kit: pieces with bevels and pockets, connectors, and which face uses which.
 
     One piece a class where it is its own mirror image, a left and a right one where it is not and both are used.
     The scale is the decomposition's own where given edge lengths fix it. Else it makes the longest side of the mesh's
     bounding box `spec.size_mm`, or is the smallest at which all pockets and walls fit, rounded up to whole mm of that
-    side. Marks are engraved later.
+    side. Marks are engraved later. With curved `patches` the decomposition is theirs, and pieces are as thick as the
+    patches need; with merged ones it is that of the triangles.
 
     Raises:
         FitError: pockets and walls do not fit at the asked size or thickness, or a piece is larger than the bed.
@@ -43,18 +50,15 @@ def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress =
     members = members_of(decomposition)
     bends = spec.bevel_degrees or (degrees(float(np.abs(members.bend_radians).max())),)
     sharpest = max(bends) + spec.swing_degrees
-    design = _Design(decomposition, members, proposed(spec, sharpest), spec)
+    design = _Design(decomposition, members, proposed(spec, sharpest), spec, patches.curved if patches else ())
     progress("finding the size", 0.2)
-    scale = _scale(design)
+    design, scale = _scaled(design)
     progress("cutting parts", 0.5)
     shapes = design.pieces(scale)
     parts, face_part = _parts(design, shapes, scale)
-    for part in parts:
-        _require_bed(part, spec)
     insets = np.stack([s.insets(t) for s, t in zip(shapes, design.triangles(scale), strict=True)])
     recess = recesses(members, insets, scale, design.dimensions.thickness_mm)
-    progress("cutting parts", 1.0)
-    return PartSet(
+    part_set = PartSet(
         scale_mm_per_unit=scale,
         dimensions=design.dimensions,
         parts=parts,
@@ -64,6 +68,12 @@ def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress =
         groove_mm=read_only(groove_mm(decomposition.mesh, members, recess)),
         notes=notes(decomposition, members, design.dimensions, spec, recess, scale),
     )
+    if patches is not None and patches.merged:
+        part_set = merged_parts(patches, part_set, spec)
+    for part in part_set.parts:
+        _require_bed(part, spec)
+    progress("cutting parts", 1.0)
+    return part_set
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +84,7 @@ class _Design:
     members: Members
     dimensions: Dimensions
     spec: KitSpec
+    curved: tuple[CurvedPatch, ...] = ()
 
     @property
     def longest(self) -> float:
@@ -84,7 +95,16 @@ class _Design:
         return laid_down(printed_lengths(self.decomposition.class_lengths, scale))
 
     def pieces(self, scale: float) -> tuple[Prismoid, ...]:
-        return thickened(self.decomposition.class_lengths, self.members, self.dimensions, self.spec, scale)
+        flat = thickened(self.decomposition.class_lengths, self.members, self.dimensions, self.spec, scale)
+        if not self.curved:
+            return flat
+        zipped = zip(flat, self.triangles(scale), self.curved, strict=True)
+        return tuple(raised(piece, triangle, patch.scaled(scale)) for piece, triangle, patch in zipped)
+
+    def needed_thickness_mm(self, scale: float) -> float:
+        """What the curved patches ask for; 0 where pieces are flat."""
+        zipped = zip(self.triangles(scale), self.curved, strict=False)
+        return max((needed_thickness_mm(t, p.scaled(scale), self.dimensions) for t, p in zipped), default=0.0)
 
     def tightest(self, scale: float) -> tuple[int, Margin]:
         """The class with the least slack of those in use, and where."""
@@ -106,6 +126,28 @@ class _Design:
         """Whole mm of the longest side at which everything fits."""
         first = ceil(self.smallest_scale() * self.longest - WHOLE_MM)
         return next(size for size in count(first) if self.slack_mm(size / self.longest) >= 0)
+
+
+def _scaled(design: _Design) -> tuple[_Design, float]:
+    """The scale, and the design with pieces as thick as curved patches need at it: they dip more the larger they are.
+
+    Raises:
+        FitError: a thickness is given that is less.
+    """
+    for _ in range(MOST_THICKENINGS):
+        scale = _scale(design)
+        needed = ceil(design.needed_thickness_mm(scale) / THICKNESS_STEP_MM - WHOLE_MM) * THICKNESS_STEP_MM
+        if needed <= design.dimensions.thickness_mm + WHOLE_MM:
+            return design, scale
+        if design.spec.thickness_mm is not None:
+            break
+        design = replace(design, dimensions=replace(design.dimensions, thickness_mm=round(needed, 6)))
+    raise FitError(
+        "the curved patches dip so far under their triangles that the pockets would lose their roof",
+        wanted=f"thickness_mm of {design.needed_thickness_mm(_scale(design)):.2f} at least",
+        found=f"{design.dimensions.thickness_mm:g}",
+        remedy="thicker pieces (--thickness-mm), fewer --curved-classes, or --patch flat",
+    )
 
 
 def _scale(design: _Design) -> float:
@@ -150,19 +192,23 @@ def _parts(design: _Design, shapes: tuple[Prismoid, ...], scale: float) -> tuple
     """The parts in use, by class, right before left, and which one each face is made from."""
     members, parts = design.members, list[Part]()
     face_part = np.empty(len(members.face_class), np.int64)
-    for index, triangle in enumerate(design.triangles(scale)):
+    for index in range(len(shapes)):
         own = members.face_class == index
         hands = [left for left in (False, True) if (own & (members.left == left)).any()]
-        right = _right_part(design, index, triangle, shapes[index]) if hands else None
+        right = _right_part(design, index, shapes[index], scale) if hands else None
         for left in hands:
             face_part[own & (members.left == left)] = len(parts)
             parts += [] if right is None else [_mirrored(right) if left else right]
     return tuple(parts), read_only(face_part)
 
 
-def _right_part(design: _Design, index: int, triangle: Floats, shape: Prismoid) -> Part:
+def _right_part(design: _Design, index: int, shape: Prismoid, scale: float) -> Part:
+    triangle = design.triangles(scale)[index]
     frames = side_frames(triangle)
     solid = shape.solid
+    if design.curved:
+        patch, levels = design.curved[index].scaled(scale), design.spec.subdivision_levels
+        solid = curved_solid(triangle, patch, shape, design.dimensions, levels)
     if design.dimensions.connector != "none":
         solid = solid.minus_all([pocket(design.dimensions).moved(frame) for frame in frames])
     symmetric = is_mirror_symmetric(design.decomposition.class_lengths[index])

@@ -4,7 +4,7 @@ import numpy as np
 
 from drkid.kit import Dimensions
 from drkid.mesh import Floats, read_only
-from drkid.parts.class_triangle import inward_normals
+from drkid.class_triangle import inward_normals
 from drkid.solid import Solid
 
 

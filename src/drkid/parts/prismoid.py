@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drkid.mesh import Floats, read_only
-from drkid.parts.class_triangle import inward_normals
+from drkid.class_triangle import inward_normals
 from drkid.solid import Solid
 
 

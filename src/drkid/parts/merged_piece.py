@@ -1,0 +1,102 @@
+"""Merged piece: several triangles as one bent solid, its outline bevelled and pocketed side by side."""
+
+import numpy as np
+
+from drkid.kit import MergedClass, MergedPiece
+from drkid.measure import bend_radians
+from drkid.mesh import Floats, Ints, TriMesh, read_only
+from drkid.parts.bevel import SHARPEST_JOINT_DEGREES
+from drkid.rigid_fit import rigid_fit
+from drkid.solid import Solid
+
+MITRE = 1e-3  # singular values below this share are left out: triangles in one plane have one normal
+
+
+def outline_frames(shape: MergedClass) -> Floats:
+    """(n, 4, 4): connector to part coordinates at every side of the outline: z is the normal of the triangle there."""
+    following = np.roll(shape.corners, -1, axis=0)
+    x = following - shape.corners
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    z = _face_normals(shape)[shape.side_face]
+    frames = np.zeros((len(x), 4, 4))
+    frames[:, :3, 0], frames[:, :3, 1], frames[:, :3, 2] = x, np.cross(z, x), z
+    frames[:, :3, 3] = (shape.corners + following) / 2
+    frames[:, 3, 3] = 1.0
+    return read_only(frames)
+
+
+def outline_bends(mesh: TriMesh, piece: MergedPiece) -> tuple[Floats, Ints]:
+    """Bend (n,) of the mesh at each side of a piece's outline, in radians, and the edge (n,) that it is."""
+    number = {tuple(edge): i for i, edge in enumerate(mesh.edges.tolist())}
+    around = [*piece.vertices, piece.vertices[0]]
+    edges = [number[min(a, b), max(a, b)] for a, b in zip(around[:-1], around[1:], strict=True)]
+    return bend_radians(mesh)[edges], np.array(edges, np.int64)
+
+
+def demanded(
+    mesh_mm: TriMesh, shape: MergedClass, piece: MergedPiece, thickness_mm: float, swing_degrees: float
+) -> Floats:
+    """(2, n): least inset of each side at the inner and outer face for one member, as `bevel.demanded` of triangles."""
+    swing, most = np.radians(swing_degrees), np.radians(SHARPEST_JOINT_DEGREES)
+    bend, _ = outline_bends(mesh_mm, piece)
+    low, high = (np.tan(np.clip(bend + s, -most, most) / 2) for s in (-swing, swing))
+    own = mesh_mm.vertices[[*piece.vertices, *piece.inner]]
+    motion = rigid_fit(own, np.vstack([shape.corners, shape.inner]))
+    corners = mesh_mm.vertices[list(piece.vertices)] @ motion[:3, :3].T + motion[:3, 3]
+    inward = outline_frames(shape)[:, :3, 1]
+    ends = np.stack([corners - shape.corners, np.roll(corners - shape.corners, -1, axis=0)])
+    far = np.einsum("esk,sk->es", ends, inward).max(axis=0)
+    return far + thickness_mm / 2 * np.stack([high, -low])
+
+
+def shared_insets(demands: list[Floats], shape: MergedClass) -> Floats:
+    """(2, n): insets that serve all members, the same on sides that are mirror images, none over the hinge axis."""
+    insets = np.max(demands, axis=0)
+    if shape.mirror:
+        n = len(shape.mirror)
+        image = [shape.mirror[(i + 1) % n] for i in range(n)]  # side i runs backwards to the image of its end
+        insets = np.maximum(insets, insets[:, image])
+    return insets + np.maximum(-insets.mean(axis=0, keepdims=True), 0.0)
+
+
+def merged_solid(shape: MergedClass, insets_mm: Floats, thickness_mm: float) -> Solid:
+    """The piece before its pockets are cut."""
+    return Solid.of(thick_mesh(shape, insets_mm, thickness_mm))
+
+
+def thick_mesh(shape: MergedClass, insets_mm: Floats, thickness_mm: float) -> TriMesh:
+    """The triangles at half the thickness to either side, mitred at their folds, joined in the planes of the bevels.
+
+    `insets_mm` (2, n) are those of the outline's sides at the inner and the outer face. Inner points move along the
+    mitre of their triangles' normals; a corner to where the bevels of its two sides meet at the height of its mitre.
+    """
+    frames, mitre = outline_frames(shape), _mitres(shape)
+    n, points = len(shape.corners), np.vstack([shape.corners, shape.inner])
+    slope = (insets_mm[1] - insets_mm[0]) / thickness_mm
+    normal = frames[:, :3, 1] - slope[:, None] * frames[:, :3, 2]
+    level = np.einsum("sk,sk->s", normal, frames[:, :3, 3]) + insets_mm.mean(axis=0)
+    skins: list[Floats] = []
+    for height in (-thickness_mm / 2, thickness_mm / 2):
+        skin = points + height * mitre
+        for i in range(n):
+            rows = np.stack([normal[i - 1], normal[i], mitre[i]])
+            skin[i] = np.linalg.solve(rows, [level[i - 1], level[i], mitre[i] @ skin[i]])
+        skins.append(skin)
+    count, a = len(points), np.arange(n)
+    b = np.roll(a, -1)
+    walls = [np.stack([a, b, b + count], axis=1), np.stack([a, b + count, a + count], axis=1)]
+    return TriMesh(np.vstack(skins), np.vstack([shape.faces[:, ::-1], shape.faces + count, *walls]))
+
+
+def _face_normals(shape: MergedClass) -> Floats:
+    return TriMesh(np.vstack([shape.corners, shape.inner]), shape.faces).face_normals
+
+
+def _mitres(shape: MergedClass) -> Floats:
+    """(n + m, 3): the shift of a point that moves all planes of its triangles by 1, or nearest to it (least squares)."""
+    normals = _face_normals(shape)
+    out = np.zeros((len(shape.corners) + len(shape.inner), 3))
+    for i in range(len(out)):
+        own = normals[(shape.faces == i).any(axis=1)]
+        out[i] = np.linalg.pinv(own, rcond=MITRE) @ np.ones(len(own))
+    return out
