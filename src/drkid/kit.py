@@ -195,6 +195,14 @@ class MergedPiece:
     inner: tuple[int, ...] = ()
 
 
+def piece_of_face(pieces: tuple[MergedPiece, ...], faces: int) -> Ints:
+    """(F,): the piece that each face belongs to."""
+    out = np.full(faces, -1, np.int64)
+    for number, piece in enumerate(pieces):
+        out[list(piece.faces)] = number
+    return out
+
+
 @dataclass(frozen=True, eq=False)
 class Patches:
     """What pieces are made of where they are not flat triangles; lengths in the decomposition's unit.

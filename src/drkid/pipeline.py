@@ -16,6 +16,7 @@ from drkid.kit import Decomposition, Kit, PartSet, Simplified, Surface
 from drkid.metrics import measure_kit
 from drkid.moulds import corrected_faces, faces_at_size, require_agreement, size_notes, with_moulds_of
 from drkid.parts import make_parts
+from drkid.patches import make_patches
 from drkid.progress import Progress, silent
 from drkid.remesh import simplify
 from drkid.spec import DEFAULT_FACES, KitSpec
@@ -25,7 +26,7 @@ from drkid.volume import read_volume
 StageProgress = Callable[[str, str, float], None]
 """Called with the stage, what it is doing, and the fraction of the stage that is done."""
 
-STAGES = ("surface", "remesh", "congruence", "parts", "assembly", "measure")
+STAGES = ("surface", "remesh", "congruence", "patches", "parts", "assembly", "measure")
 
 
 def nobody(_stage: str, _what: str, _fraction: float) -> None:
@@ -64,15 +65,19 @@ def make_kit(source: str | Path | None = None, spec: KitSpec | None = None, prog
         spec, simplified = _simplified(surface, spec, told)
     with stage("congruence") as told:
         decomposition = decompose(simplified.mesh, spec, told, surface.mesh)
+    with stage("patches") as told:
+        patches = make_patches(decomposition, surface.mesh, spec, told)
+    triangles = decomposition
+    decomposition = decomposition if patches is None else patches.decomposition
     with stage("parts") as told:
-        part_set = make_parts(decomposition, spec, told)
+        part_set = make_parts(triangles if spec.merge else decomposition, spec, told, patches)
     scale = part_set.scale_mm_per_unit
     printed = _scaled(decomposition, scale)
     with stage("assembly") as told:
         assembly = assemble(printed.mesh, part_set, told)
     with stage("measure"):
         surfaces = surface.mesh.scaled(scale), simplified.mesh.scaled(scale)
-        metrics = measure_kit(*surfaces, printed, part_set, {})
+        metrics = measure_kit(*surfaces, printed, part_set, {}, patches, len(triangles.class_lengths))
     return Kit(
         spec=_resolved(spec, surface, printed, part_set),
         source=surface.source,
@@ -86,11 +91,13 @@ def make_kit(source: str | Path | None = None, spec: KitSpec | None = None, prog
             *surface.notes,
             *simplified.notes,
             *printed.notes,
+            *(patches.notes if patches else ()),
             *part_set.notes,
             *size_notes(spec, printed.mesh),
             *_crossings(printed),
         ),
         writer=write_kit,
+        patches=patches,
     )
 
 
@@ -158,6 +165,7 @@ def _resolved(spec: KitSpec, surface: Surface, printed: Decomposition, part_set:
             "rod_diameter_mm": dimensions.rod_diameter_mm or None,
             "min_wall_mm": dimensions.min_wall_mm,
             "knuckle_wall_mm": dimensions.knuckle_wall_mm,
+            "curved_classes": len(printed.class_lengths) if spec.patch == "curved" else None,
             "mark_depth_mm": spec.preset.mark_depth_mm if spec.mark_depth_mm is None else spec.mark_depth_mm,
         }
     )

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from drkid.class_triangle import inward_normals
-from drkid.curved_patch import CurvedPatch, barycentric_grid, side_points
+from drkid.curved_patch import CurvedPatch, barycentric_grid
 from drkid.kit import Dimensions
 from drkid.mesh import Floats, TriMesh
 from drkid.parts.pocket import side_frames
@@ -24,18 +24,25 @@ FOOTPRINT_POINTS = 9  # in either direction, at which heights over a pocket are 
 
 
 def raised(prismoid: Prismoid, triangle: Floats, patch: CurvedPatch) -> Prismoid:
-    """The flat piece's bevels made steep enough for a piece whose outer skin rises over its sides by their sagittas.
+    """The flat piece's bevels made steep enough for skins that rise and dip at its sides.
 
-    A bevel that serves all bends at the inner face and at the outer one serves them at every height between: the
-    outer height is t/2 + s here, where a concave joint needs d·(t/2 + s)/(t/2) and a convex one no more than d.
+    A bevel that serves all bends at the lowest and at the highest point of a side serves them at every height
+    between. From t/2 to h a joint that cuts away asks for d·h/(t/2), one that adds for no more than d.
     """
-    half = prismoid.thickness_mm / 2
-    inner, outer = prismoid.insets(triangle)
-    sagitta = np.array([patch.points(side_points(i, np.array([0.5])))[0, 2] for i in range(3)])
-    top = half + np.maximum(sagitta, 0.0)
-    reached = np.where(outer > 0, outer * top / half, outer)
-    slope = (reached - inner) / (half + top)
-    return bevelled(triangle, np.stack([inner, inner + slope * 2 * half]), prismoid.thickness_mm)
+    half, insets = prismoid.thickness_mm / 2, prismoid.insets(triangle)
+    shares = np.linspace(0, 1, FOOTPRINT_POINTS)
+    reach = np.empty((2, 3))
+    for side, inward in enumerate(inward_normals(triangle)):
+        line = triangle[side] + shares[:, None] * (triangle[(side + 1) % 3] - triangle[side])
+        heights = np.stack(
+            [patch.points(_barycentric(triangle, line + at * inward))[:, 2] for at in (0.0, *insets[:, side])]
+        )
+        reach[:, side] = half - min(float(heights.min()), 0.0), half + max(float(heights.max()), 0.0)
+    wanted = np.where(insets > 0, insets * reach / half, insets)
+    slope = (wanted[1] - wanted[0]) / reach.sum(axis=0)
+    middle = wanted[0] + slope * reach[0]
+    middle += np.maximum(-middle, 0.0)
+    return bevelled(triangle, np.stack([middle - slope * half, middle + slope * half]), prismoid.thickness_mm)
 
 
 def needed_thickness_mm(triangle: Floats, patch: CurvedPatch, dimensions: Dimensions) -> float:

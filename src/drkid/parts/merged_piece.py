@@ -9,6 +9,7 @@ from drkid.parts.bevel import SHARPEST_JOINT_DEGREES
 from drkid.rigid_fit import rigid_fit
 from drkid.solid import Solid
 
+SKIRT_MM = 1.0  # beyond what stands out of the outline; the bevels cut it away
 MITRE = 1e-3  # singular values below this share are left out: triangles in one plane have one normal
 
 
@@ -40,9 +41,9 @@ def demanded(
     swing, most = np.radians(swing_degrees), np.radians(SHARPEST_JOINT_DEGREES)
     bend, _ = outline_bends(mesh_mm, piece)
     low, high = (np.tan(np.clip(bend + s, -most, most) / 2) for s in (-swing, swing))
-    own = mesh_mm.vertices[[*piece.vertices, *piece.inner]]
-    motion = rigid_fit(own, np.vstack([shape.corners, shape.inner]))
-    corners = mesh_mm.vertices[list(piece.vertices)] @ motion[:3, :3].T + motion[:3, 3]
+    corners = mesh_mm.vertices[list(piece.vertices)]
+    motion = rigid_fit(corners, shape.corners)
+    corners = corners @ motion[:3, :3].T + motion[:3, 3]
     inward = outline_frames(shape)[:, :3, 1]
     ends = np.stack([corners - shape.corners, np.roll(corners - shape.corners, -1, axis=0)])
     far = np.einsum("esk,sk->es", ends, inward).max(axis=0)
@@ -60,32 +61,45 @@ def shared_insets(demands: list[Floats], shape: MergedClass) -> Floats:
 
 
 def merged_solid(shape: MergedClass, insets_mm: Floats, thickness_mm: float) -> Solid:
-    """The piece before its pockets are cut."""
-    return Solid.of(thick_mesh(shape, insets_mm, thickness_mm))
+    """The piece before its pockets are cut: its triangles thick and mitred at their folds, cut by its sides' bevels.
+
+    `insets_mm` (2, n) are those of the sides at the inner and the outer face. A bevel's plane cuts the whole piece,
+    which is what a convex outline allows.
+    """
+    frames = outline_frames(shape)
+    slope = (insets_mm[1] - insets_mm[0]) / thickness_mm
+    normals = frames[:, :3, 1] - slope[:, None] * frames[:, :3, 2]
+    levels = np.einsum("sk,sk->s", normals, frames[:, :3, 3]) + insets_mm.mean(axis=0)
+    skirt = max(-float(insets_mm.min()), 0.0) + SKIRT_MM
+    solid = Solid.of(slab_mesh(shape, skirt, thickness_mm))
+    for normal, level in zip(normals, levels, strict=True):
+        solid = solid.beyond(normal, float(level))
+    return solid
 
 
-def thick_mesh(shape: MergedClass, insets_mm: Floats, thickness_mm: float) -> TriMesh:
-    """The triangles at half the thickness to either side, mitred at their folds, joined in the planes of the bevels.
+def slab_mesh(shape: MergedClass, skirt_mm: float, thickness_mm: float) -> TriMesh:
+    """The triangles, carried on beyond the outline by a skirt in their own planes, at half the thickness either way.
 
-    `insets_mm` (2, n) are those of the outline's sides at the inner and the outer face. Inner points move along the
-    mitre of their triangles' normals; a corner to where the bevels of its two sides meet at the height of its mitre.
+    Every point moves along the mitre of its triangles' normals, so that each triangle keeps its thickness: exactly
+    where no more than three planes meet, nearest to it by least squares elsewhere.
     """
     frames, mitre = outline_frames(shape), _mitres(shape)
-    n, points = len(shape.corners), np.vstack([shape.corners, shape.inner])
-    slope = (insets_mm[1] - insets_mm[0]) / thickness_mm
-    normal = frames[:, :3, 1] - slope[:, None] * frames[:, :3, 2]
-    level = np.einsum("sk,sk->s", normal, frames[:, :3, 3]) + insets_mm.mean(axis=0)
-    skins: list[Floats] = []
-    for height in (-thickness_mm / 2, thickness_mm / 2):
-        skin = points + height * mitre
-        for i in range(n):
-            rows = np.stack([normal[i - 1], normal[i], mitre[i]])
-            skin[i] = np.linalg.solve(rows, [level[i - 1], level[i], mitre[i] @ skin[i]])
-        skins.append(skin)
-    count, a = len(points), np.arange(n)
+    n, inner = len(shape.corners), len(shape.inner)
+    following = np.roll(shape.corners, -1, axis=0)
+    outward = -skirt_mm * frames[:, :3, 1]
+    points = np.vstack([shape.corners, shape.inner, shape.corners + outward, following + outward])
+    normals = frames[:, :3, 2]
+    shift = np.vstack([mitre, normals, normals]) * thickness_mm / 2
+    a = np.arange(n)
     b = np.roll(a, -1)
-    walls = [np.stack([a, b, b + count], axis=1), np.stack([a, b + count, a + count], axis=1)]
-    return TriMesh(np.vstack(skins), np.vstack([shape.faces[:, ::-1], shape.faces + count, *walls]))
+    start, end = n + inner + a, 2 * n + inner + a
+    skirts = [np.stack([b, a, start], axis=1), np.stack([b, start, end], axis=1)]
+    gaps = np.stack([b, end, np.roll(start, -1)], axis=1)
+    upper = np.vstack([shape.faces, *skirts, gaps])
+    count, low, high = len(points), start, end
+    rim = [(low, high), (high, np.roll(low, -1))]
+    walls = [np.stack(w, axis=1) for x, y in rim for w in ((x, y, y + count), (x, y + count, x + count))]
+    return TriMesh(np.vstack([points - shift, points + shift]), np.vstack([upper[:, ::-1], upper + count, *walls]))
 
 
 def _face_normals(shape: MergedClass) -> Floats:

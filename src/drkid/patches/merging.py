@@ -6,7 +6,7 @@ import numpy as np
 
 from drkid.kit import Decomposition, MergedClass, MergedPiece, Outcome, Patches
 from drkid.measure import bend_radians
-from drkid.mesh import Floats, Ints, TriMesh, read_only
+from drkid.mesh import Floats, TriMesh, read_only
 from drkid.patches.identity import mirror_corners, misfits, residuals, shapes
 from drkid.patches.matching import paired
 from drkid.patches.outline import Outlined, outlined
@@ -114,11 +114,3 @@ def _divided(
         face_errors=read_only(face_errors),
         outcome=Outcome("converged" if reached else "stalled", message),
     )
-
-
-def piece_of_face(pieces: tuple[MergedPiece, ...], faces: int) -> Ints:
-    """(F,): the piece that each face belongs to."""
-    out = np.full(faces, -1, np.int64)
-    for number, piece in enumerate(pieces):
-        out[list(piece.faces)] = number
-    return out

@@ -7,6 +7,9 @@ import numpy as np
 from drkid.mesh import Floats, Ints, TriMesh, read_only
 
 
+WIDEST = np.radians(178.0)  # angle of an outline: a convex piece can be cut by the planes of its sides
+
+
 @dataclass(frozen=True, eq=False)
 class Outlined:
     """Merged faces as a polygon: `vertices` (n,) of the mesh round it, counter-clockwise, then `inner` (m,) ones.
@@ -36,6 +39,12 @@ class Outlined:
             read_only(np.roll(self.side_face, -by)),
         )
 
+    def widest_angle(self, mesh: TriMesh) -> float:
+        """The largest angle of the outline, measured along the triangles, in radians."""
+        angles = corner_angles(mesh)[list(self.faces)]
+        total = np.bincount(self.triangles.ravel(), weights=angles.ravel())
+        return float(total[: len(self.vertices)].max())
+
     @property
     def pattern(self) -> frozenset[tuple[int, ...]]:
         """The triangles as sets of numbers: what a relabelling has to keep."""
@@ -62,3 +71,9 @@ def outlined(mesh: TriMesh, faces: tuple[int, ...]) -> Outlined:
     triangles = np.array([[number[int(v)] for v in row] for row in corners], np.int64)
     side_face = [sides[a, b] for a, b in zip(loop, [*loop[1:], loop[0]], strict=True)]
     return Outlined(faces, tuple(loop), inner, read_only(triangles), read_only(np.array(side_face, np.int64)))
+
+
+def corner_angles(mesh: TriMesh) -> Floats:
+    """(F, 3): the angle at each corner of each face (law of cosines)."""
+    after, across, before = mesh.side_lengths, np.roll(mesh.side_lengths, -1, axis=1), np.roll(mesh.side_lengths, 1, 1)
+    return np.arccos(np.clip((after**2 + before**2 - across**2) / (2 * after * before), -1, 1))

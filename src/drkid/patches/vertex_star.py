@@ -4,11 +4,9 @@ from collections import Counter
 
 import numpy as np
 
-from drkid.mesh import Floats, TriMesh
+from drkid.mesh import Bools, Floats, TriMesh
 from drkid.patches.identity import residuals, shapes
-from drkid.patches.outline import outlined
-
-STRAIGHT = np.pi + 1e-9  # parts of a star stay convex: no more than half a turn round their tip
+from drkid.patches.outline import WIDEST, corner_angles, outlined
 
 
 def starred(mesh: TriMesh, size: int, tolerance: float) -> list[tuple[int, ...]]:
@@ -24,7 +22,7 @@ def starred(mesh: TriMesh, size: int, tolerance: float) -> list[tuple[int, ...]]
         for vertex in _apart(mesh, fans, free, valence, tolerance):
             taken.append(fans[vertex])
             free[list(fans[vertex])] = False
-    angles = _angles(mesh)
+    angles = corner_angles(mesh)
     while (run := _longest_run(mesh, fans, free, angles, size)) is not None:
         taken.append(run)
         free[list(run)] = False
@@ -47,9 +45,10 @@ def _fans(mesh: TriMesh) -> list[tuple[int, ...]]:
     return fans
 
 
-def _apart(mesh: TriMesh, fans: list[tuple[int, ...]], free: np.ndarray, valence: int, tolerance: float) -> list[int]:
+def _apart(mesh: TriMesh, fans: list[tuple[int, ...]], free: Bools, valence: int, tolerance: float) -> list[int]:
     """Vertices of a valence whose stars are free and share no face: greedily the frequent shapes, fewest rivals first."""
     open_ = [v for v, fan in enumerate(fans) if len(fan) == valence and free[list(fan)].all()]
+    open_ = [v for v in open_ if outlined(mesh, fans[v]).widest_angle(mesh) <= WIDEST]
     if not open_:
         return []
     stands = shapes(residuals(mesh, [outlined(mesh, fans[v]) for v in open_])[0], tolerance)
@@ -69,14 +68,8 @@ def _apart(mesh: TriMesh, fans: list[tuple[int, ...]], free: np.ndarray, valence
     return chosen
 
 
-def _angles(mesh: TriMesh) -> Floats:
-    """(F, 3): the angle at each corner (law of cosines)."""
-    after, across, before = mesh.side_lengths, np.roll(mesh.side_lengths, -1, axis=1), np.roll(mesh.side_lengths, 1, 1)
-    return np.arccos(np.clip((after**2 + before**2 - across**2) / (2 * after * before), -1, 1))
-
-
 def _longest_run(
-    mesh: TriMesh, fans: list[tuple[int, ...]], free: np.ndarray, angles: Floats, size: int
+    mesh: TriMesh, fans: list[tuple[int, ...]], free: Bools, angles: Floats, size: int
 ) -> tuple[int, ...] | None:
     """The most free faces in a row round any vertex that make a convex piece; None where no two are left."""
     best: tuple[int, ...] = ()
@@ -87,9 +80,9 @@ def _longest_run(
             angle = 0.0
             for f in (*fan[start:], *fan[:start]):
                 angle += turn[f]
-                if not free[f] or len(run) == size or angle > STRAIGHT:
+                if not free[f] or len(run) == size or angle > WIDEST:
                     break
                 run.append(f)
-            if len(run) > len(best):
+            if len(run) > max(len(best), 1) and outlined(mesh, tuple(run)).widest_angle(mesh) <= WIDEST:
                 best = tuple(run)
     return best if len(best) > 1 else None
