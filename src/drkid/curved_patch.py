@@ -88,9 +88,7 @@ def barycentric_grid(levels: int) -> BarycentricGrid:
     )
     centres = points[np.array(faces)].mean(axis=1)
     central = int(np.argmin(((centres - 1 / 3) ** 2).sum(axis=1)))
-    return BarycentricGrid(
-        read_only(points), read_only(np.array(faces, np.int64)), (first, second, third), central
-    )
+    return BarycentricGrid(read_only(points), read_only(np.array(faces, np.int64)), (first, second, third), central)
 
 
 def fitted(barycentric: Floats, points: Floats, degree: int) -> CurvedPatch:

@@ -6,8 +6,8 @@ from exact_shapes import decomposed, geodesic, potato, sixths
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drkid.parts.bevel import MOST_MIDDLE_INSET, bevel_insets, bisector_insets, demanded, limited
 from drkid.class_triangle import equal_sides
+from drkid.parts.bevel import MOST_MIDDLE_INSET, bevel_insets, bisector_insets, demanded, limited
 from drkid.parts.members import members_of
 
 

@@ -4,11 +4,11 @@ import numpy as np
 
 from drkid.assembly.merged_order import merged_steps
 from drkid.assembly.order import steps
-from drkid.rigid_fit import rigid_fit
 from drkid.kit import Assembly, Joint, PartSet, Piece, piece_of_face
 from drkid.measure import bend_radians
 from drkid.mesh import TriMesh, read_only
 from drkid.progress import Progress, silent
+from drkid.rigid_fit import rigid_fit
 
 
 def assemble(mesh_mm: TriMesh, part_set: PartSet, progress: Progress = silent) -> Assembly:

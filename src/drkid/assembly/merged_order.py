@@ -24,9 +24,7 @@ def merged_steps(pieces: tuple[Piece, ...], joints: tuple[Joint, ...]) -> tuple[
     order, standing = [first], {first}
     while len(order) < len(pieces):
         waiting = {n for p in standing for n in beside[p]} - standing
-        order.append(
-            min(waiting, key=lambda p: (p == last, -sum(k for n, k in beside[p].items() if n in standing), p))
-        )
+        order.append(min(waiting, key=lambda p: (p == last, -sum(k for n, k in beside[p].items() if n in standing), p)))
         standing.add(order[-1])
     rank = {piece: i for i, piece in enumerate(order)}
     return tuple(

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from drkid.mesh import Floats
 from drkid.class_triangle import equal_sides
+from drkid.mesh import Floats
 from drkid.parts.members import Members
 
 SHARPEST_JOINT_DEGREES = 140.0  # bends beyond this are served as if they were this sharp

@@ -103,9 +103,7 @@ def _bevel_planes(triangle: Floats, prismoid: Prismoid) -> tuple[Floats, Floats]
     return np.column_stack([inward, -slope]), level
 
 
-def _skin(
-    triangle: Floats, patch: CurvedPatch, planes: tuple[Floats, Floats], height_mm: float, levels: int
-) -> Floats:
+def _skin(triangle: Floats, patch: CurvedPatch, planes: tuple[Floats, Floats], height_mm: float, levels: int) -> Floats:
     """(n, 3): the grid on the surface at a height over the patch, its sides in the planes of the bevels."""
     grid, inward = barycentric_grid(levels), inward_normals(triangle)
 

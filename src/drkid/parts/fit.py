@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drkid.class_triangle import inward_normals
 from drkid.errors import FitError
 from drkid.kit import Dimensions
 from drkid.mesh import Floats
-from drkid.class_triangle import inward_normals
 from drkid.parts.prismoid import Prismoid, side_insets
 
 SCALE_TOLERANCE = 1e-5  # relative: the size is rounded up to whole mm afterwards

@@ -6,12 +6,12 @@ from math import ceil, degrees
 
 import numpy as np
 
-from drkid.errors import FitError
+from drkid.class_triangle import LEFT_CORNERS, is_mirror_symmetric, laid_down, printed_lengths
 from drkid.curved_patch import CurvedPatch
+from drkid.errors import FitError
 from drkid.kit import Connector, Decomposition, Dimensions, Part, PartSet, Patches, class_id
 from drkid.mesh import Floats, Ints, read_only
 from drkid.parts.curved_piece import curved_solid, needed_thickness_mm, raised
-from drkid.class_triangle import LEFT_CORNERS, is_mirror_symmetric, laid_down, printed_lengths
 from drkid.parts.dimensions import THICKNESS_STEP_MM, proposed
 from drkid.parts.fit import FITS_MM, Margin, margins, smallest_scale
 from drkid.parts.groove import groove_mm, recesses

@@ -77,9 +77,7 @@ def _handedness(shape: MergedClass) -> Handedness:
     return "left" if len(lengths) == 3 and lengths[1] > lengths[2] else "right"
 
 
-def _grooves(
-    mesh_mm: TriMesh, pieces: tuple[MergedPiece, ...], insets: list[Floats], dimensions: Dimensions
-) -> Floats:
+def _grooves(mesh_mm: TriMesh, pieces: tuple[MergedPiece, ...], insets: list[Floats], dimensions: Dimensions) -> Floats:
     """(J,): widest gap at each joint, in the order of the mesh's edges; as `groove.groove_mm`."""
     half = dimensions.thickness_mm / 2
     total = np.zeros((2, len(mesh_mm.edges)))

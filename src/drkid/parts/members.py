@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drkid.class_triangle import LEFT_CORNERS, LEFT_SIDES, inward_normals, laid_down, laid_on, symmetrised
 from drkid.kit import Decomposition
 from drkid.measure import bend_radians
 from drkid.mesh import Bools, Floats, Ints, TriMesh, read_only
-from drkid.class_triangle import LEFT_CORNERS, LEFT_SIDES, inward_normals, laid_down, laid_on, symmetrised
 
 
 @dataclass(frozen=True, eq=False)

@@ -83,34 +83,43 @@ def slab_mesh(shape: MergedClass, skirt_mm: float, thickness_mm: float) -> TriMe
     Every point moves along the mitre of its triangles' normals, so that each triangle keeps its thickness: exactly
     where no more than three planes meet, nearest to it by least squares elsewhere.
     """
-    frames, mitre = outline_frames(shape), _mitres(shape)
-    n, inner = len(shape.corners), len(shape.inner)
-    following = np.roll(shape.corners, -1, axis=0)
-    outward = -skirt_mm * frames[:, :3, 1]
-    points = np.vstack([shape.corners, shape.inner, shape.corners + outward, following + outward])
-    normals = frames[:, :3, 2]
-    shift = np.vstack([mitre, normals, normals]) * thickness_mm / 2
-    a = np.arange(n)
-    b = np.roll(a, -1)
-    start, end = n + inner + a, 2 * n + inner + a
-    skirts = [np.stack([b, a, start], axis=1), np.stack([b, start, end], axis=1)]
-    gaps = np.stack([b, end, np.roll(start, -1)], axis=1)
-    upper = np.vstack([shape.faces, *skirts, gaps])
-    count, low, high = len(points), start, end
-    rim = [(low, high), (high, np.roll(low, -1))]
-    walls = [np.stack(w, axis=1) for x, y in rim for w in ((x, y, y + count), (x, y + count, x + count))]
+    normals, n = _face_normals(shape), len(shape.corners)
+    points = np.vstack([shape.corners, shape.inner])
+    around = [np.flatnonzero((shape.faces == i).any(axis=1)) for i in range(len(points))]
+    at_side = [np.unique([shape.side_face[i - 1], shape.side_face[i]]) for i in range(n)]
+    mitre = np.stack([_mitre(normals[own]) for own in [*around, *at_side]])
+    points = np.vstack([points, shape.corners + skirt_mm * _outward(shape)])
+    count, shift, a = len(points), mitre * thickness_mm / 2, np.arange(n)
+    b, s = np.roll(a, -1), a + count - n
+    t = np.roll(s, -1)
+    upper = np.vstack([shape.faces, np.stack([b, a, s], axis=1), np.stack([b, s, t], axis=1)])
+    walls = [np.stack([s, t, t + count], axis=1), np.stack([s, t + count, s + count], axis=1)]
     return TriMesh(np.vstack([points - shift, points + shift]), np.vstack([upper[:, ::-1], upper + count, *walls]))
+
+
+def _outward(shape: MergedClass) -> Floats:
+    """(n, 3): where a corner goes if both of its sides move outwards by 1 at least, each in the plane of its triangle.
+
+    Along the fold where one meets the corner; else half-way between the sides, where several do only nearly in plane.
+    """
+    frames, n = outline_frames(shape), len(shape.corners)
+    inward = frames[:, :3, 1]
+    points = np.vstack([shape.corners, shape.inner])
+    out = np.empty((n, 3))
+    for i in range(n):
+        own = shape.faces[(shape.faces == i).any(axis=1)]
+        direction = -(inward[i - 1] + inward[i])
+        if len(own) == 2:
+            far = next(v for v in np.intersect1d(own[0], own[1]) if v != i)
+            direction = points[i] - points[far]
+        out[i] = direction / -max(inward[i - 1] @ direction, inward[i] @ direction)
+    return out
 
 
 def _face_normals(shape: MergedClass) -> Floats:
     return TriMesh(np.vstack([shape.corners, shape.inner]), shape.faces).face_normals
 
 
-def _mitres(shape: MergedClass) -> Floats:
-    """(n + m, 3): the shift of a point that moves all planes of its triangles by 1, or nearest to it (least squares)."""
-    normals = _face_normals(shape)
-    out = np.zeros((len(shape.corners) + len(shape.inner), 3))
-    for i in range(len(out)):
-        own = normals[(shape.faces == i).any(axis=1)]
-        out[i] = np.linalg.pinv(own, rcond=MITRE) @ np.ones(len(own))
-    return out
+def _mitre(normals: Floats) -> Floats:
+    """(3,): the shift that moves every plane with one of these normals (m, 3) by 1, or nearest to it."""
+    return np.linalg.pinv(normals, rcond=MITRE) @ np.ones(len(normals))

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from drkid.class_triangle import inward_normals
 from drkid.kit import Dimensions
 from drkid.mesh import Floats, read_only
-from drkid.class_triangle import inward_normals
 from drkid.solid import Solid
 
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drkid.mesh import Floats, read_only
 from drkid.class_triangle import inward_normals
+from drkid.mesh import Floats, read_only
 from drkid.solid import Solid
 
 

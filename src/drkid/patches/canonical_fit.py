@@ -1,13 +1,14 @@
 """Canonical patches of all classes together: close to the surface, smooth over the joints, tight along them."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
+from drkid.curved_patch import barycentric_grid, gradients, monomials, side_points
 from drkid.measure import project
 from drkid.mesh import Floats, Ints, TriMesh, read_only
-from drkid.curved_patch import barycentric_grid, gradients, monomials, side_points
 from drkid.patches.canonical_patch import (
     ARCS,
     BUBBLES,
@@ -54,7 +55,7 @@ def canonical_patches(
     lean = _leans(laid, group, count)
     bases = [symmetric_bubbles(lengths) for lengths in laid.class_lengths]
     starts = count + np.concatenate([[0], np.cumsum([b.shape[1] for b in bases])])
-    spans = [slice(a, b) for a, b in zip(starts[:-1], starts[1:], strict=True)]
+    spans = [slice(a, b) for a, b in pairwise(starts.tolist())]
     frame = _Frame(laid, group, lean, tuple(bases), tuple(spans), int(starts[-1]))
     near, smooth = frame.distances(surface), frame.breaks()
     weight = np.sqrt(smoothness) * laid.mesh.mean_edge
@@ -152,5 +153,7 @@ def _largest_curvatures(laid: LaidFaces, group: Ints, lean: Floats, most_gap: fl
     """(g,): the curvature 8s/L² of each group at which the joints' gap has reached `most_gap`."""
     own = _joint_groups(laid, group)
     across = 2 * np.abs(np.sin(laid.bend_radians / 2 - lean[own])) * laid.mesh.edge_lengths**2 / 8
-    widest = np.array([np.percentile(across[own == g], PERCENTILE) if (own == g).any() else 0.0 for g in range(len(lean))])
+    widest = np.array(
+        [np.percentile(across[own == g], PERCENTILE) if (own == g).any() else 0.0 for g in range(len(lean))]
+    )
     return np.divide(most_gap, widest, out=np.full(len(lean), np.inf), where=widest > 0)

@@ -6,8 +6,8 @@ Loop, "Smooth subdivision surfaces based on triangles" (1987); the weights at a 
 import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array
 
-from drkid.mesh import Floats, Ints, TriMesh, read_only
 from drkid.curved_patch import barycentric_grid
+from drkid.mesh import Floats, Ints, TriMesh, read_only
 
 CORNERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
 """The four triangles of a face whose corners are 0, 1, 2 and the points on whose sides 0, 1, 2 are 3, 4, 5."""

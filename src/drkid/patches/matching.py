@@ -14,9 +14,10 @@ SHARES = 1_000_000  # weights of a matching are whole numbers
 def paired(mesh: TriMesh, tolerance: float) -> list[tuple[int, ...]]:
     """Pairs of neighbouring faces and the faces left over, as tuples.
 
-    Only pairs of convex outline are taken. A maximum matching of the dual graph (Edmonds 1965): every face of a closed surface, whose dual is cubic and
-    bridgeless, finds a partner (Petersen 1891). Of the perfect matchings one is sought that needs few shapes: pairs
-    count by how many of the pairs chosen before, at first of all possible ones, have their shape.
+    Only pairs of convex outline are taken. A maximum matching of the dual graph (Edmonds 1965): every face of a
+    closed surface, whose dual is cubic and bridgeless, finds a partner (Petersen 1891). Of the perfect matchings one
+    is sought that needs few shapes: pairs count by how many of the pairs chosen before, at first of all possible
+    ones, have their shape.
     """
     pairs = [tuple(int(f) for f in pair) for pair in mesh.edge_faces]
     candidates = [piece for piece in (outlined(mesh, pair) for pair in pairs) if piece.widest_angle(mesh) <= WIDEST]
@@ -31,7 +32,7 @@ def paired(mesh: TriMesh, tolerance: float) -> list[tuple[int, ...]]:
         if best is None or count < best[0]:
             best = count, chosen
         weight = _popularity(near, np.array(chosen), stands)
-    assert best is not None  # noqa: S101  there is at least one round
+    assert best is not None
     taken = [pairs[i] for i in best[1]]
     alone = set(range(len(mesh.faces))) - {f for pair in taken for f in pair}
     return [*taken, *((f,) for f in sorted(alone))]

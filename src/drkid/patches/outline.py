@@ -6,7 +6,6 @@ import numpy as np
 
 from drkid.mesh import Floats, Ints, TriMesh, read_only
 
-
 WIDEST = np.radians(178.0)  # angle of an outline: a convex piece can be cut by the planes of its sides
 
 

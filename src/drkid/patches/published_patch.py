@@ -87,7 +87,9 @@ def _clustered(space: Floats, classes: int, rng: np.random.Generator) -> Ints:
     best, label = np.inf, np.zeros(len(space), np.int64)
     for _ in range(RESTARTS):
         _, found = kmeans2(space, classes, minit="++", rng=rng, missing="raise")
-        means = np.stack([space[found == k].mean(axis=0) if (found == k).any() else np.zeros(4) for k in range(classes)])
+        means = np.stack(
+            [space[found == k].mean(axis=0) if (found == k).any() else np.zeros(4) for k in range(classes)]
+        )
         energy = float(((space - means[found]) ** 2).sum())
         if energy < best:
             best, label = energy, found.astype(np.int64)
@@ -128,5 +130,3 @@ def _in_part_frames(laid: LaidFaces, patches: Floats, levels: int) -> Floats:
     motion = rigid_fit(laid.mesh.vertices[laid.vertices], flat[laid.face_class] * mirror)
     placed = np.einsum("fij,fnj->fni", motion[:, :3, :3], out) + motion[:, None, :3, 3]
     return placed * mirror
-
-

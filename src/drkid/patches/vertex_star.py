@@ -46,7 +46,7 @@ def _fans(mesh: TriMesh) -> list[tuple[int, ...]]:
 
 
 def _apart(mesh: TriMesh, fans: list[tuple[int, ...]], free: Bools, valence: int, tolerance: float) -> list[int]:
-    """Vertices of a valence whose stars are free and share no face: greedily the frequent shapes, fewest rivals first."""
+    """Vertices of a valence whose stars are free and share no face: fewest rivals first, then frequent shapes."""
     open_ = [v for v, fan in enumerate(fans) if len(fan) == valence and free[list(fan)].all()]
     open_ = [v for v in open_ if outlined(mesh, fans[v]).widest_angle(mesh) <= WIDEST]
     if not open_:
