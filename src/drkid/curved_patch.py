@@ -82,10 +82,10 @@ def barycentric_grid(levels: int) -> BarycentricGrid:
         if a > 0 and b > 0:
             faces.append((number[a, b, c], number[a - 1, b, c + 1], number[a, b - 1, c + 1]))
     points = np.array(lattice, np.float64) / n
-    first, second, third = (
-        read_only(np.array([number[point(i)] for i in range(n + 1)], np.int64))
-        for point in (lambda i: (n - i, i, 0), lambda i: (0, n - i, i), lambda i: (i, 0, n - i))
-    )
+    along = range(n + 1)
+    first = read_only(np.array([number[n - i, i, 0] for i in along], np.int64))
+    second = read_only(np.array([number[0, n - i, i] for i in along], np.int64))
+    third = read_only(np.array([number[i, 0, n - i] for i in along], np.int64))
     centres = points[np.array(faces)].mean(axis=1)
     central = int(np.argmin(((centres - 1 / 3) ** 2).sum(axis=1)))
     return BarycentricGrid(read_only(points), read_only(np.array(faces, np.int64)), (first, second, third), central)

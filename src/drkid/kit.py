@@ -187,7 +187,7 @@ class MergedClass:
 
 @dataclass(frozen=True)
 class MergedPiece:
-    """Faces that are one piece: its class, and the mesh's vertex at each corner of the class and at each inner point."""
+    """Faces that are one piece: its class, and the mesh's vertex at each corner and inner point of the class."""
 
     faces: tuple[int, ...]
     class_index: int

@@ -135,7 +135,7 @@ def _corner(triangle: Floats, beyond: Callable[[Floats, int], Floats], corner: i
     sides = ((corner - 1) % 3, corner)
     plan = triangle[corner][None].copy()
     for _ in range(NEWTON_STEPS):
-        steps = np.vstack([plan, plan + [STEP_MM, 0.0], plan + [0.0, STEP_MM]])
+        steps = plan + STEP_MM * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
         values = np.stack([beyond(steps, s) for s in sides])
         jacobian = (values[:, 1:] - values[:, :1]) / STEP_MM
         plan = plan - np.linalg.solve(jacobian, values[:, 0])

@@ -85,6 +85,7 @@ def _grooves(mesh_mm: TriMesh, pieces: tuple[MergedPiece, ...], insets: list[Flo
     for piece in pieces:
         bend, edges = outline_bends(mesh_mm, piece)
         recess = insets[piece.class_index] + np.array([[-half], [half]]) * np.tan(bend / 2)
-        np.add.at(total, (slice(None), edges), recess)
+        for height in range(2):
+            np.add.at(total[height], edges, recess[height])
         outer[edges] = True
     return np.maximum(total.max(axis=0) * np.cos(bend_radians(mesh_mm) / 2), 0.0)[outer]

@@ -1,5 +1,7 @@
 """Merged piece: several triangles as one bent solid, its outline bevelled and pocketed side by side."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from drkid.kit import MergedClass, MergedPiece
@@ -30,7 +32,7 @@ def outline_bends(mesh: TriMesh, piece: MergedPiece) -> tuple[Floats, Ints]:
     """Bend (n,) of the mesh at each side of a piece's outline, in radians, and the edge (n,) that it is."""
     number = {tuple(edge): i for i, edge in enumerate(mesh.edges.tolist())}
     around = [*piece.vertices, piece.vertices[0]]
-    edges = [number[min(a, b), max(a, b)] for a, b in zip(around[:-1], around[1:], strict=True)]
+    edges = [number[min(a, b), max(a, b)] for a, b in pairwise(around)]
     return bend_radians(mesh)[edges], np.array(edges, np.int64)
 
 
