@@ -40,11 +40,3 @@ def test_fitted_patch_goes_through_the_corners_and_reproduces_a_polynomial() -> 
     assert patch.points(grid.points) == pytest.approx(surface, abs=1e-9)
     slope = np.column_stack([-(0.6 * plan[:, 0] - 0.2 * plan[:, 1]), 0.2 * plan[:, 0], np.ones(len(plan))])
     assert patch.normals(grid.points) == pytest.approx(slope / np.linalg.norm(slope, axis=1, keepdims=True), abs=1e-7)
-
-
-def test_mirror_image_of_a_patch() -> None:
-    grid = barycentric_grid(2)
-    patch = fitted(grid.points, grid.points @ CORNERS + RNG.normal(0, 0.1, (len(grid.points), 3)), 4)
-    image = patch.mirrored((1, 0, 2))
-    b = RNG.dirichlet(np.ones(3), 6)
-    assert image.points(b[:, [1, 0, 2]]) == pytest.approx(patch.points(b) * [-1, 1, 1])

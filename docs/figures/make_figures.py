@@ -32,9 +32,11 @@ from drkid.congruence.levenberg_marquardt import solve
 from drkid.congruence.palette import Palette, palette_of_classes
 from drkid.congruence.quadratic_model import connectivity, quadratic_model
 from drkid.congruence.target import Target
+from drkid.errors import FitError
 from drkid.export.colour import CONNECTOR_COLOUR, class_colour
 from drkid.mesh import Bools, Floats, TriMesh
 from drkid.parts import make_parts
+from drkid.patches import make_patches
 from drkid.solid import Solid
 
 HERE = Path(__file__).parent
@@ -455,6 +457,45 @@ def known(curve: Sequence[dict], seconds: Floats) -> tuple[Floats, Bools]:
     return np.where(last < 0, np.nan, distances), exact & (last >= 0)
 
 
+# ---- curved and merged pieces
+
+
+def patches() -> None:
+    """The nucleus of flat, curved and merged pieces, from one decomposition."""
+    made = nucleus_kit()
+    kinds = (
+        ("flat", {}),
+        ("curved, as published", {"patch": "curved", "curved": "published"}),
+        ("curved, canonical", {"patch": "curved"}),
+        ("pairs", {"merge": 2}),
+        ("hexagons and parts", {"merge": 6}),
+    )
+    pictures, captions = [], []
+    for name, options in kinds:
+        spec = KitSpec(size_mm=float(made.decomposition.mesh.extents.max()), **options)
+        try:
+            bodies, count, moulds = pieces_of(made, spec)
+        except FitError:  # the paper's corners are shrunk by subdivision, and need a larger print
+            bodies, count, moulds = pieces_of(made, spec.model_copy(update={"size_mm": None}))
+        pictures.append(render(bodies, VIEW, 520))
+        captions.append(f"{name}\n{count} pieces, {moulds} moulds")
+    row("patches.png", pictures, captions)
+
+
+def pieces_of(made: Kit, spec: KitSpec) -> tuple[list[Body], int, int]:
+    """Another kit of the same M_f: its pieces at their places, their number and that of their shapes."""
+    found = make_patches(made.decomposition, made.surface, spec)
+    decomposition = made.decomposition if found is None else found.decomposition
+    part_set = make_parts(made.decomposition if spec.merge else decomposition, spec, patches=found)
+    assembly = assemble(decomposition.mesh.scaled(part_set.scale_mm_per_unit), part_set)
+    meshes = [part.solid.mesh() for part in part_set.parts]
+    bodies = []
+    for piece in assembly.pieces:
+        mesh = carried(meshes[piece.part], piece.transform)
+        bodies.append(Body(mesh, colour(class_colour(part_set.parts[piece.part].class_index))))
+    return bodies, len(assembly.pieces), len(part_set.parts)
+
+
 # ---- pictures side by side
 
 
@@ -488,6 +529,7 @@ FUNCTIONS = (
     diffusion,
     fold,
     time_to_quality,
+    patches,
 )
 FIGURES = {figure.__name__: figure for figure in FUNCTIONS}
 

@@ -34,12 +34,6 @@ class CurvedPatch:
         """All coordinates times `factor`."""
         return CurvedPatch(self.exponents, read_only(self.coefficients * factor))
 
-    def mirrored(self, corners: tuple[int, ...]) -> "CurvedPatch":
-        """The mirror image in x, whose corner i is the image of this patch's corner `corners[i]`."""
-        return CurvedPatch(
-            read_only(self.exponents[:, list(corners)]), read_only(self.coefficients * np.array([-1.0, 1.0, 1.0]))
-        )
-
 
 def monomials(exponents: Ints, barycentric: Floats) -> Floats:
     """(n, t): every term at barycentric coordinates (n, 3)."""

@@ -5,8 +5,20 @@ import pytest
 import trimesh
 
 from drkid.curved_patch import barycentric_grid
-from drkid.mesh import TriMesh
-from drkid.patches.loop_subdivision import limit_points, loop_patches, subdivided
+from drkid.mesh import Floats, TriMesh
+from drkid.patches.loop_subdivision import loop_patches, subdivided
+
+
+def limit_points(mesh: TriMesh) -> Floats:
+    """(V, 3): where endless subdivision takes each vertex: (3v + 8β Σ neighbours)/(3 + 8nβ)."""
+    n = np.maximum(mesh.valence, 1)
+    beta = (5 / 8 - (3 / 8 + np.cos(2 * np.pi / n) / 4) ** 2) / n
+    ring = np.zeros_like(mesh.vertices)
+    a, b = mesh.edges.T
+    np.add.at(ring, a, mesh.vertices[b])
+    np.add.at(ring, b, mesh.vertices[a])
+    weight = (8 * beta)[:, None]
+    return (3 * mesh.vertices + weight * ring) / (3 + n[:, None] * weight)
 
 
 def test_agrees_with_another_implementation(potato) -> None:

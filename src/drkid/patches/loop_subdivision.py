@@ -39,18 +39,6 @@ def _vertex_mask(mesh: TriMesh) -> csr_array:
     return csr_array(ring + diags_array(1 - n * beta))
 
 
-def limit_points(mesh: TriMesh) -> Floats:
-    """(V, 3): where endless subdivision takes each vertex: (3v + 8β Σ neighbours)/(3 + 8nβ)."""
-    n = np.maximum(mesh.valence, 1)
-    beta = (5 / 8 - (3 / 8 + np.cos(2 * np.pi / n) / 4) ** 2) / n
-    ring = np.zeros_like(mesh.vertices)
-    a, b = mesh.edges.T
-    np.add.at(ring, a, mesh.vertices[b])
-    np.add.at(ring, b, mesh.vertices[a])
-    weight = (8 * beta)[:, None]
-    return (3 * mesh.vertices + weight * ring) / (3 + n[:, None] * weight)
-
-
 def loop_patches(mesh: TriMesh, levels: int) -> Floats:
     """(F, n, 3): the patch of each face after `levels` steps, its points as in `barycentric_grid(levels)`.
 
