@@ -84,14 +84,15 @@ def merged_row(decomposition: Decomposition, surface: Surface, merge: int, toler
     }
 
 
-def measured(path: Path) -> dict[str, object]:
-    """Both tables of one shape."""
+def measured(path: Path, only: str) -> dict[str, object]:
+    """Both tables of one shape, or one of them."""
     spec = KitSpec.parse({"rounds": ROUNDS, "label": LABELS.get(path.name)})
     surface = read_surface(path, spec)
     decomposition = decompose(simplify(surface, spec).mesh, spec, surface=surface.mesh)
-    curved = [curved_row(surface, decomposition, *row) for row in CURVED]
+    curved = [curved_row(surface, decomposition, *row) for row in (CURVED[:1] if only == "merged" else CURVED)]
     size = float(curved[0]["mean_edge_mm"]) / decomposition.mesh.mean_edge * float(decomposition.mesh.extents.max())
-    merged = [merged_row(decomposition, surface, m, t, size) for m in MERGES for t in TOLERANCES_MM]
+    wanted = [] if only == "curved" else [(m, t) for m in MERGES for t in TOLERANCES_MM]
+    merged = [merged_row(decomposition, surface, m, t, size) for m, t in wanted]
     return {"shape": path.name, "faces": len(decomposition.mesh.faces), "curved": curved, "merged": merged}
 
 
@@ -106,16 +107,18 @@ def main() -> None:
     """Measure, print, write."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--shapes", default=",".join(SHAPES), help="files of the data folder")
+    parser.add_argument("--only", choices=("curved", "merged", "both"), default="both", help="one of the tables")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results" / "patches.json")
     arguments = parser.parse_args()
     data = require_data()
     found = []
     for name in arguments.shapes.split(","):
-        result = measured(data / name)
+        result = measured(data / name, arguments.only)
         found.append(result)
         print(name, result["faces"], "faces")
         printed(result["curved"])  # type: ignore[arg-type]
-        printed(result["merged"])  # type: ignore[arg-type]
+        if result["merged"]:
+            printed(result["merged"])  # type: ignore[arg-type]
     arguments.out.write_text(json.dumps(found, indent=1) + "\n")
 
 

@@ -479,7 +479,7 @@ def patches() -> None:
             bodies, count, moulds = pieces_of(made, spec.model_copy(update={"size_mm": None}))
         pictures.append(render(bodies, VIEW, 520))
         captions.append(f"{name}\n{count} pieces, {moulds} moulds")
-    row("patches.png", pictures, captions)
+    row("patches.png", pictures, captions, drop=0.36)
 
 
 def pieces_of(made: Kit, spec: KitSpec) -> tuple[list[Body], int, int]:
@@ -499,14 +499,14 @@ def pieces_of(made: Kit, spec: KitSpec) -> tuple[list[Body], int, int]:
 # ---- pictures side by side
 
 
-def row(name: str, pictures: Sequence[Floats], captions: Sequence[str]) -> None:
+def row(name: str, pictures: Sequence[Floats], captions: Sequence[str], drop: float = 0.12) -> None:
     """Rendered pictures side by side, their captions below."""
     height = max(len(picture) for picture in pictures)
     padded = [np.pad(p, _room(height - len(p)), constant_values=1.0) for p in pictures]
     figure, axes = plt.subplots(1, len(padded), figsize=(10, 11 / len(padded)), layout="constrained")
     for axis, picture, caption in zip(axes, padded, captions, strict=True):
         axis.imshow(picture, interpolation="lanczos")
-        axis.set_title(caption, y=-0.12, fontsize=10)
+        axis.set_title(caption, y=-drop, fontsize=10)
         axis.axis("off")
     figure.savefig(HERE / name, dpi=130, bbox_inches="tight")
     with Image.open(HERE / name) as image:

@@ -29,7 +29,8 @@ from drkid.spec import KitSpec
 MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 FIRST_GUESS_THICKNESSES = 4.0  # mean edge of the pieces with which the search for a size begins
 WHOLE_MM = 1e-6
-MOST_THICKENINGS = 8  # of curved pieces, each of which may need a larger size; two do
+MOST_THICKENINGS = 12  # of curved pieces, each of which may need a larger size; two or three do
+MOST_BEVEL_OF_REACH = 0.5  # of a connector's reach: what the bevels of curved pieces may leave without walls
 
 
 def make_parts(
@@ -106,6 +107,17 @@ class _Design:
         zipped = zip(self.triangles(scale), self.curved, strict=False)
         return max((needed_thickness_mm(t, p.scaled(scale), self.dimensions) for t, p in zipped), default=0.0)
 
+    def needed_depth_mm(self, scale: float) -> float:
+        """How deep pockets of curved pieces are, so that their bevels, deeper than flat ones', leave the hold.
+
+        0 where pieces are flat or have no pockets.
+        """
+        if not self.curved or self.dimensions.connector == "none":
+            return 0.0
+        zipped = zip(self.pieces(scale), self.triangles(scale), strict=True)
+        deepest = max(float(piece.insets(triangle).max()) for piece, triangle in zipped)
+        return deepest / MOST_BEVEL_OF_REACH + 2 * self.dimensions.clearance_mm
+
     def tightest(self, scale: float) -> tuple[int, Margin]:
         """The class with the least slack of those in use, and where."""
         used = np.unique(self.members.face_class)
@@ -135,19 +147,25 @@ def _scaled(design: _Design) -> tuple[_Design, float]:
         FitError: a thickness is given that is less.
     """
     for _ in range(MOST_THICKENINGS):
-        scale = _scale(design)
-        needed = ceil(design.needed_thickness_mm(scale) / THICKNESS_STEP_MM - WHOLE_MM) * THICKNESS_STEP_MM
-        if needed <= design.dimensions.thickness_mm + WHOLE_MM:
+        scale, dimensions = _scale(design), design.dimensions
+        thickness, depth = _stepped(design.needed_thickness_mm(scale)), _stepped(design.needed_depth_mm(scale))
+        if max(thickness - dimensions.thickness_mm, depth - dimensions.pocket_depth_mm) <= WHOLE_MM:
             return design, scale
-        if design.spec.thickness_mm is not None:
+        if thickness > dimensions.thickness_mm and design.spec.thickness_mm is not None:
             break
-        design = replace(design, dimensions=replace(design.dimensions, thickness_mm=round(needed, 6)))
+        thickness, depth = max(thickness, dimensions.thickness_mm), max(depth, dimensions.pocket_depth_mm)
+        design = replace(design, dimensions=replace(dimensions, thickness_mm=thickness, pocket_depth_mm=depth))
     raise FitError(
         "the curved patches dip so far under their triangles that the pockets would lose their roof",
         wanted=f"thickness_mm of {design.needed_thickness_mm(_scale(design)):.2f} at least",
         found=f"{design.dimensions.thickness_mm:g}",
         remedy="thicker pieces (--thickness-mm), fewer --curved-classes, or --patch flat",
     )
+
+
+def _stepped(length_mm: float) -> float:
+    """Rounded up to the steps in which thicknesses are proposed."""
+    return round(ceil(length_mm / THICKNESS_STEP_MM - WHOLE_MM) * THICKNESS_STEP_MM, 6)
 
 
 def _scale(design: _Design) -> float:

@@ -13,8 +13,8 @@ from drkid.patches.smoothness import assembled, joints
 from drkid.spec import DEPTHS, PUBLISHED_CLASSES, KitSpec
 
 SMOOTHNESS = 0.005  # weight of tangent breaks: the distance to the surface gives way by a tenth for them
-GAP_CLEARANCES = 1.6  # the gap at 95 of 100 joints in clearances; what two halves in their pockets give is 2
-MEAN_EDGE_CLEARANCES = 220.0  # mean edge of a print in clearances where no size is given: 44 mm by fdm
+GAP_CLEARANCES = 1.5  # the gap at 95 of 100 joints in clearances; what two halves in their pockets give is 2
+MEAN_EDGE_CLEARANCES = 200.0  # mean edge of a print in clearances where no size is given: 40 mm by fdm
 PERCENTILE = 95
 
 
