@@ -208,7 +208,8 @@ class Patches:
     """What pieces are made of where they are not flat triangles; lengths in the decomposition's unit.
 
     Curved: the decomposition by curved classes, a patch for each. Merged: the shapes, the pieces, and `misfit` (P,),
-    how far the farthest corner of each lies from its shape's.
+    how far the farthest corner of each lies from its shape's. `allowance` is the gap or the tolerance that was kept:
+    where the size of the print was found only afterwards, it was not known in millimetres before.
     """
 
     decomposition: Decomposition
@@ -218,6 +219,7 @@ class Patches:
     pieces: tuple[MergedPiece, ...] = ()
     misfit: Floats | None = None
     notes: tuple[str, ...] = ()
+    allowance: float | None = None
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from drkid.data import nucleus_path
 from drkid.export import write_kit
 from drkid.formats import is_mesh_path
 from drkid.intersection import self_intersections
-from drkid.kit import Decomposition, Kit, PartSet, Simplified, Surface
+from drkid.kit import Decomposition, Kit, PartSet, Patches, Simplified, Surface
 from drkid.metrics import measure_kit
 from drkid.moulds import corrected_faces, faces_at_size, require_agreement, size_notes, with_moulds_of
 from drkid.parts import make_parts
@@ -79,7 +79,9 @@ def make_kit(source: str | Path | None = None, spec: KitSpec | None = None, prog
         surfaces = surface.mesh.scaled(scale), simplified.mesh.scaled(scale)
         metrics = measure_kit(*surfaces, printed, part_set, {}, patches, len(triangles.class_lengths))
     return Kit(
-        spec=_resolved(spec, surface, printed, part_set),
+        spec=_resolved(spec, surface, printed, part_set).model_copy(
+            update=_patch_choices(spec, patches, len(triangles.class_lengths), scale)
+        ),
         source=surface.source,
         surface=surfaces[0],
         simplified=surfaces[1],
@@ -165,7 +167,16 @@ def _resolved(spec: KitSpec, surface: Surface, printed: Decomposition, part_set:
             "rod_diameter_mm": dimensions.rod_diameter_mm or None,
             "min_wall_mm": dimensions.min_wall_mm,
             "knuckle_wall_mm": dimensions.knuckle_wall_mm,
-            "curved_classes": len(printed.class_lengths) if spec.patch == "curved" else None,
             "mark_depth_mm": spec.preset.mark_depth_mm if spec.mark_depth_mm is None else spec.mark_depth_mm,
         }
     )
+
+
+def _patch_choices(spec: KitSpec, patches: Patches | None, triangle_classes: int, scale: float) -> dict[str, object]:
+    """The automatic choices of curved and merged pieces, in millimetres of the print."""
+    if patches is None or patches.allowance is None:
+        return {} if patches is None else {"curved_classes": spec.curved_classes_for(triangle_classes)}
+    allowance_mm = patches.allowance * scale
+    if spec.merge is not None:
+        return {"merge_tolerance_mm": allowance_mm}
+    return {"curved_classes": spec.curved_classes_for(triangle_classes), "curved_gap_mm": allowance_mm}

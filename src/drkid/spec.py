@@ -255,6 +255,13 @@ class KitSpec(BaseModel):
         f"{PUBLISHED_CLASSES} with --curved published.",
         ge=1,
     )
+    curved_gap_mm: float | None = _field(
+        None,
+        "Patches",
+        "Largest gap between the curved sides of canonical patches, at 95 of 100 joints; 1.5 clearances when not "
+        "given.",
+        gt=0,
+    )
     subdivision_levels: int = _field(3, "Patches", "Subdivisions of a curved patch into 4 each: 3 make 64.", ge=1, le=4)
     merge: Merge | None = _field(
         None,
@@ -320,6 +327,12 @@ class KitSpec(BaseModel):
         if self.method == "pressure":
             return PRESSURE_TOLERANCE
         return EXACT_TOLERANCE if faces <= MOST_WALKED_FACES else LARGE_TOLERANCE
+
+    def curved_classes_for(self, triangle_classes: int) -> int:
+        """`curved_classes`, or what stands for it where triangles have so many classes."""
+        if self.curved_classes is not None:
+            return self.curved_classes
+        return PUBLISHED_CLASSES if self.curved == "published" else DEPTHS * triangle_classes
 
     def vertex_count(self, genus: int) -> int:
         """Vertices of the simplified mesh: as asked, or from the faces by Euler's formula F = 2V − 4 + 4g.

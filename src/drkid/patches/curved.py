@@ -10,9 +10,9 @@ from drkid.patches.depth_classes import with_depths
 from drkid.patches.laid_faces import LaidFaces
 from drkid.patches.published_patch import curvature_space, published_patches
 from drkid.patches.smoothness import assembled, joints
-from drkid.spec import DEPTHS, PUBLISHED_CLASSES, KitSpec
+from drkid.spec import KitSpec
 
-SMOOTHNESS = 0.005  # weight of tangent breaks: the distance to the surface gives way by a tenth for them
+SMOOTHNESS = 0.004  # weight of tangent breaks: the distance to the surface gives way by a tenth for them
 GAP_CLEARANCES = 1.5  # the gap at 95 of 100 joints in clearances; what two halves in their pockets give is 2
 MEAN_EDGE_CLEARANCES = 200.0  # mean edge of a print in clearances where no size is given: 40 mm by fdm
 PERCENTILE = 95
@@ -20,21 +20,27 @@ PERCENTILE = 95
 
 def curved_patches(decomposition: Decomposition, surface: TriMesh, spec: KitSpec) -> Patches:
     """Curved patches of a decomposition of `surface`, both in the same unit; canonical or as published."""
+    classes = spec.curved_classes_for(len(decomposition.class_lengths))
     if spec.curved == "published":
         rng = np.random.default_rng(spec.seed)
-        classes = min(spec.curved_classes or PUBLISHED_CLASSES, len(decomposition.mesh.faces))
+        classes = min(classes, len(decomposition.mesh.faces))
         found = published_patches(decomposition, classes, spec.subdivision_levels, rng)
         shapes, laid, divided = found.shapes, found.laid, found.decomposition
-        threshold = found.threshold_percent
+        threshold, allowance = found.threshold_percent, None
     else:
-        classes = spec.curved_classes or DEPTHS * len(decomposition.class_lengths)
-        clearance_mm = spec.preset.clearance_mm if spec.clearance_mm is None else spec.clearance_mm
-        gap = GAP_CLEARANCES * clearance_mm * units_per_mm(decomposition, spec)
-        divided, laid, canonical = with_depths(decomposition, surface, classes, SMOOTHNESS, gap)
+        allowance = most_gap(decomposition, spec)
+        divided, laid, canonical = with_depths(decomposition, surface, classes, SMOOTHNESS, allowance)
         shapes = tuple(patch.surface for patch in canonical)
         threshold = _threshold_percent(laid, shapes, spec.subdivision_levels)
     figures = _figures(decomposition, laid, shapes, threshold, spec.subdivision_levels)
-    return Patches(divided, shapes, figures)
+    return Patches(divided, shapes, figures, allowance=allowance)
+
+
+def most_gap(decomposition: Decomposition, spec: KitSpec) -> float:
+    """The gap that canonical patches may leave at their joints, in the mesh's unit."""
+    clearance_mm = spec.preset.clearance_mm if spec.clearance_mm is None else spec.clearance_mm
+    gap_mm = GAP_CLEARANCES * clearance_mm if spec.curved_gap_mm is None else spec.curved_gap_mm
+    return gap_mm * units_per_mm(decomposition, spec)
 
 
 def units_per_mm(decomposition: Decomposition, spec: KitSpec) -> float:

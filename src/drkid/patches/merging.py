@@ -45,7 +45,7 @@ def merged_patches(decomposition: Decomposition, spec: KitSpec, tolerance: float
             misfit[p] = misfits(points, own.points(mesh))
     found = tuple(piece for piece in placed if piece is not None)
     divided = _divided(decomposition, tuple(classes), found, spec)
-    return Patches(divided, merged=tuple(classes), pieces=found, misfit=read_only(misfit))
+    return Patches(divided, merged=tuple(classes), pieces=found, misfit=read_only(misfit), allowance=tolerance)
 
 
 def _first_corner(mesh: TriMesh, piece: Outlined) -> int:
