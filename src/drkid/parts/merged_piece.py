@@ -82,8 +82,8 @@ def merged_solid(shape: MergedClass, insets_mm: Floats, thickness_mm: float) -> 
 def slab_mesh(shape: MergedClass, skirt_mm: float, thickness_mm: float) -> TriMesh:
     """The triangles, carried on beyond the outline by a skirt in their own planes, at half the thickness either way.
 
-    Every point moves along the mitre of its triangles' normals, so that each triangle keeps its thickness: exactly
-    where no more than three planes meet, nearest to it by least squares elsewhere.
+    Every point moves along the mitre of its triangles' normals, so that no triangle is thinner than stated: it keeps
+    its thickness where no more than three planes meet, and is a little thicker elsewhere.
     """
     normals, n = _face_normals(shape), len(shape.corners)
     points = np.vstack([shape.corners, shape.inner])
@@ -123,5 +123,6 @@ def _face_normals(shape: MergedClass) -> Floats:
 
 
 def _mitre(normals: Floats) -> Floats:
-    """(3,): the shift that moves every plane with one of these normals (m, 3) by 1, or nearest to it."""
-    return np.linalg.pinv(normals, rcond=MITRE) @ np.ones(len(normals))
+    """(3,): the shift that moves every plane with one of these normals (m, 3) by 1, or little more where it cannot."""
+    shift = np.linalg.pinv(normals, rcond=MITRE) @ np.ones(len(normals))
+    return shift / (normals @ shift).min()
