@@ -27,6 +27,7 @@ from playwright.sync_api import Page, sync_playwright
 
 from drkid import Kit, KitSpec, make_kit
 from drkid.assembly import assemble
+from drkid.class_triangle import laid_down
 from drkid.congruence.annealing import Schedule, anneal
 from drkid.congruence.framework import Framework
 from drkid.congruence.hop import START_DAMPING, START_HEAT, START_STEPS_PER_FACE, START_WEIGHTS
@@ -35,12 +36,12 @@ from drkid.congruence.levenberg_marquardt import solve
 from drkid.congruence.palette import Palette, palette_of_classes
 from drkid.congruence.quadratic_model import connectivity, quadratic_model
 from drkid.congruence.target import Target
+from drkid.errors import FitError
 from drkid.export.colour import CONNECTOR_COLOUR, class_colour
 from drkid.export.plates import plates as build_plates
 from drkid.kit import Dimensions, Part
 from drkid.mesh import Bools, Floats, TriMesh
 from drkid.parts import make_parts
-from drkid.parts.class_triangle import laid_down
 from drkid.parts.detent import bump
 from drkid.parts.dimensions import proposed
 from drkid.parts.hinge import hinge_half
@@ -48,6 +49,7 @@ from drkid.parts.marks import marked
 from drkid.parts.pocket import pocket, side_frames
 from drkid.parts.prismoid import bevelled
 from drkid.parts.snap import snap_half
+from drkid.patches import make_patches
 from drkid.report.colouring import channels as colour
 from drkid.report.net import net_of
 from drkid.report.picture import Body, camera, render
@@ -671,17 +673,56 @@ def known(curve: Sequence[dict], seconds: Floats) -> tuple[Floats, Bools]:
     return np.where(last < 0, np.nan, distances), exact & (last >= 0)
 
 
+# ---- curved and merged pieces
+
+
+def patches() -> None:
+    """The nucleus of flat, curved and merged pieces, from one decomposition."""
+    made = nucleus_kit()
+    kinds = (
+        ("flat", {}),
+        ("curved, as published", {"patch": "curved", "curved": "published"}),
+        ("curved, canonical", {"patch": "curved"}),
+        ("pairs", {"merge": 2}),
+        ("hexagons and parts", {"merge": 6}),
+    )
+    pictures, captions = [], []
+    for name, options in kinds:
+        spec = KitSpec(size_mm=float(made.decomposition.mesh.extents.max()), **options)
+        try:
+            bodies, count, moulds = pieces_of(made, spec)
+        except FitError:  # the paper's corners are shrunk by subdivision, and need a larger print
+            bodies, count, moulds = pieces_of(made, spec.model_copy(update={"size_mm": None}))
+        pictures.append(render(bodies, VIEW, 520))
+        captions.append(f"{name}\n{count} pieces, {moulds} moulds")
+    row("patches.png", pictures, captions, drop=0.36)
+
+
+def pieces_of(made: Kit, spec: KitSpec) -> tuple[list[Body], int, int]:
+    """Another kit of the same M_f: its pieces at their places, their number and that of their shapes."""
+    found = make_patches(made.decomposition, made.surface, spec)
+    decomposition = made.decomposition if found is None else found.decomposition
+    part_set = make_parts(made.decomposition if spec.merge else decomposition, spec, patches=found)
+    assembly = assemble(decomposition.mesh.scaled(part_set.scale_mm_per_unit), part_set)
+    meshes = [part.solid.mesh() for part in part_set.parts]
+    bodies = []
+    for piece in assembly.pieces:
+        mesh = carried(meshes[piece.part], piece.transform)
+        bodies.append(Body(mesh, colour(class_colour(part_set.parts[piece.part].class_index))))
+    return bodies, len(assembly.pieces), len(part_set.parts)
+
+
 # ---- pictures side by side
 
 
-def row(name: str, pictures: Sequence[Floats], captions: Sequence[str]) -> None:
+def row(name: str, pictures: Sequence[Floats], captions: Sequence[str], drop: float = 0.12) -> None:
     """Rendered pictures side by side, their captions below."""
     height = max(len(picture) for picture in pictures)
     padded = [np.pad(p, _room(height - len(p)), constant_values=1.0) for p in pictures]
     figure, axes = plt.subplots(1, len(padded), figsize=(10, 11 / len(padded)), layout="constrained")
     for axis, picture, caption in zip(axes, padded, captions, strict=True):
         axis.imshow(picture, interpolation="lanczos")
-        axis.set_title(caption, y=-0.12, fontsize=10)
+        axis.set_title(caption, y=-drop, fontsize=10)
         axis.axis("off")
     figure.savefig(HERE / name, dpi=130, bbox_inches="tight")
     with Image.open(HERE / name) as image:
@@ -710,6 +751,7 @@ FUNCTIONS = (
     time_to_quality,
     report,
     guide,
+    patches,
 )
 FIGURES = {figure.__name__: figure for figure in FUNCTIONS}
 

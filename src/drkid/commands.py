@@ -33,7 +33,7 @@ FROM_PROCESS = {  # what kit.json has because of its process
     "thickness_mm",
 }
 SCALES = {"size_mm", "mean_edge_mm", "fit"}  # one of them at a time
-GROUPS = ("Input", "Mesh", "Congruence", "Pieces", "Output")  # in the order in which help shows them
+GROUPS = ("Input", "Mesh", "Congruence", "Pieces", "Patches", "Output")  # in the order in which help shows them
 
 # ---- flags from KitSpec
 

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from drkid.curved_patch import CurvedPatch
 from drkid.mesh import Floats, Ints, TriMesh
 from drkid.progress import Progress, StageProgress, nobody
 from drkid.solid import Solid
@@ -153,6 +154,82 @@ class Decomposition:
     rigidity: Rigidity | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class CurvedFigures:
+    """What curved patches cost and bring; lengths in the decomposition's unit, breaks in degrees.
+
+    `threshold_percent` is the paper's T: the largest distance of a patch to its class in (w, x, y, z), of the mean
+    edge. `gap` (E,) is the widest gap of the boundary curves at each joint. Tangent breaks are the angles between the
+    tangent planes along the joints; `flat` is the same of the flat triangles. `surface` is the assembled surface.
+    """
+
+    threshold_percent: float
+    gap: Floats
+    flat_break_mean: float
+    flat_break_p95: float
+    break_mean: float
+    break_p95: float
+    surface: TriMesh
+
+
+@dataclass(frozen=True, eq=False)
+class MergedClass:
+    """A shape of merged pieces, in its part frame: a polygon in space, and the triangles that fill it.
+
+    `corners` (n, 3) go round the outline counter-clockwise from outside; `inner` (m, 3) are points within; `faces`
+    (f, 3) index both, corners first. `side_face` (n,) is the face at each side. `achiral` where the shape is its own
+    mirror image; corner i is then the image of corner `mirror[i]`.
+    """
+
+    corners: Floats
+    inner: Floats
+    faces: Ints
+    side_face: Ints
+    mirror: tuple[int, ...] = ()
+
+    @property
+    def achiral(self) -> bool:
+        """Whether the shape is its own mirror image."""
+        return bool(self.mirror)
+
+
+@dataclass(frozen=True)
+class MergedPiece:
+    """Faces that are one piece: its class, and the mesh's vertex at each corner and inner point of the class."""
+
+    faces: tuple[int, ...]
+    class_index: int
+    vertices: tuple[int, ...]
+    inner: tuple[int, ...] = ()
+
+
+def piece_of_face(pieces: tuple[MergedPiece, ...], faces: int) -> Ints:
+    """(F,): the piece that each face belongs to."""
+    out = np.full(faces, -1, np.int64)
+    for number, piece in enumerate(pieces):
+        out[list(piece.faces)] = number
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Patches:
+    """What pieces are made of where they are not flat triangles; lengths in the decomposition's unit.
+
+    Curved: the decomposition by curved classes, a patch for each. Merged: the shapes, the pieces, and `misfit` (P,),
+    how far the farthest corner of each lies from its shape's. `allowance` is the gap or the tolerance that was kept:
+    where the size of the print was found only afterwards, it was not known in millimetres before.
+    """
+
+    decomposition: Decomposition
+    curved: tuple[CurvedPatch, ...] = ()
+    figures: CurvedFigures | None = None
+    merged: tuple[MergedClass, ...] = ()
+    pieces: tuple[MergedPiece, ...] = ()
+    misfit: Floats | None = None
+    notes: tuple[str, ...] = ()
+    allowance: float | None = None
+
+
 @dataclass(frozen=True)
 class Dimensions:
     """Lengths in mm that every piece and connector of a kit shares (`fabrication`: the names and formulas).
@@ -188,7 +265,8 @@ class Dimensions:
 class Part:
     """A printed shape of a class, in the part frame of the kit format.
 
-    `corners` (3, 3) counter-clockwise from outside, `side_frames` (3, 4, 4) from connector to part coordinates.
+    `corners` (n, 3) counter-clockwise from outside, `side_frames` (n, 4, 4) from connector to part coordinates; three
+    of a triangle, more of merged ones. `solid` is all of it, whatever its faces: flat, curved or bent.
     `variant` counts the bevels of a class from 1; 0 where it has one.
     """
 
@@ -274,16 +352,25 @@ class PartSet:
     findings: tuple[Finding, ...] = ()
     groove_choices: tuple[GrooveChoice, ...] = ()
     coupon: Solid | None = None
+    merged: tuple[MergedPiece, ...] = ()  # class_index is then the part's number; empty where each face is a piece
 
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """A part at its place: `vertices[i]` of the assembly lies at the part's corner i; `transform` (4, 4)."""
+    """A part at its place: `vertices[i]` of the assembly lies at the part's corner i; `transform` (4, 4).
 
-    face: int
+    `faces` are those of M_f that it covers: one, or all that are merged in it.
+    """
+
+    faces: tuple[int, ...]
     part: int
-    vertices: tuple[int, int, int]
+    vertices: tuple[int, ...]
     transform: Floats
+
+    @property
+    def face(self) -> int:
+        """The first of its faces, by which steps and joints name the piece."""
+        return self.faces[0]
 
 
 @dataclass(frozen=True)
@@ -423,6 +510,31 @@ class Distance:
 
 
 @dataclass(frozen=True)
+class CurvedMetrics:
+    """What tables report of curved pieces; `surface_curved` is d_H of M_i and the assembled curved surface."""
+
+    threshold_percent: float
+    gap_mean_mm: float
+    gap_p95_mm: float
+    flat_break_mean_degrees: float
+    flat_break_p95_degrees: float
+    break_mean_degrees: float
+    break_p95_degrees: float
+    surface_curved: Distance
+
+
+@dataclass(frozen=True)
+class MergedMetrics:
+    """What tables report of merged pieces: before and after, and how far corners lie from their shape's."""
+
+    triangles: int
+    triangle_classes: int
+    single_triangles: int
+    misfit_mean_mm: float
+    misfit_max_mm: float
+
+
+@dataclass(frozen=True)
 class Metrics:
     """What tables report; lengths in mm of the printed object."""
 
@@ -449,6 +561,8 @@ class Metrics:
     assembly: AssemblyFigures | None = None
     unique_connector_parts: int = 0
     groove_choices: tuple[GrooveChoice, ...] = ()
+    curved: CurvedMetrics | None = None
+    merged: MergedMetrics | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -470,6 +584,7 @@ class Kit:
     notes: tuple[str, ...]
     writer: Callable[["Kit", Path, bool, StageProgress], Path]
     documents: Callable[["Kit", Progress], dict[str, bytes]]
+    patches: Patches | None = None
 
     def write(self, folder: str | Path, *, force: bool = False, progress: StageProgress = nobody) -> Path:
         """Write the kit folder, whole or not at all, and return its path.

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import igl
 import numpy as np
 
-from drkid.mesh import Floats, Ints, TriMesh, read_only
+from drkid.mesh import Bools, Floats, Ints, TriMesh, read_only
 
 CONCAVE_DEGREES = 1.0  # a joint counts as concave when its inner angle is above 180° by more than this
 HAUSDORFF_SAMPLES = 60_000  # per direction: the mean is then good to about 0.5 % of itself
@@ -82,9 +82,10 @@ class Dihedral:
     concave_percent: float
 
 
-def dihedral(mesh: TriMesh) -> Dihedral:
-    """Summary of a closed mesh's dihedral angles."""
+def dihedral(mesh: TriMesh, edges: Bools | None = None) -> Dihedral:
+    """Summary of a closed mesh's dihedral angles, at all edges or at those of a mask (E,)."""
     bend = np.degrees(bend_radians(mesh))
+    bend = bend if edges is None else bend[edges]
     return Dihedral(
         float(np.abs(bend).mean()),
         float(np.percentile(np.abs(bend), 95)),

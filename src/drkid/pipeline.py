@@ -12,10 +12,11 @@ from drkid.data import nucleus_path
 from drkid.export import write_kit
 from drkid.formats import is_mesh_path
 from drkid.intersection import self_intersections
-from drkid.kit import Decomposition, Kit, PartSet, Simplified, Surface
+from drkid.kit import Decomposition, Kit, PartSet, Patches, Simplified, Surface
 from drkid.metrics import measure_kit
 from drkid.moulds import corrected_faces, faces_at_size, require_agreement, size_notes, with_moulds_of
 from drkid.parts import make_parts
+from drkid.patches import make_patches
 from drkid.progress import Progress, StageProgress, nobody, silent
 from drkid.remesh import simplify
 from drkid.report import make_documents
@@ -24,7 +25,7 @@ from drkid.surface import extract_surface
 from drkid.volume import read_volume
 from drkid.wall_thickness import require_walls
 
-STAGES = ("surface", "remesh", "congruence", "parts", "assembly", "measure")
+STAGES = ("surface", "remesh", "congruence", "patches", "parts", "assembly", "measure")
 
 
 def make_kit(source: str | Path | None = None, spec: KitSpec | None = None, progress: StageProgress = nobody) -> Kit:
@@ -59,17 +60,23 @@ def make_kit(source: str | Path | None = None, spec: KitSpec | None = None, prog
         spec, simplified = _simplified(surface, spec, told)
     with stage("congruence") as told:
         decomposition = decompose(simplified.mesh, spec, told, simplified.target)
+    with stage("patches") as told:
+        patches = make_patches(decomposition, surface.mesh, spec, told)
+    triangles = decomposition
+    decomposition = decomposition if patches is None else patches.decomposition
     with stage("parts") as told:
-        part_set = make_parts(decomposition, spec, told)
+        part_set = make_parts(triangles if spec.merge else decomposition, spec, told, patches)
     scale = part_set.scale_mm_per_unit
     printed = _scaled(decomposition, scale)
     with stage("assembly") as told:
         assembly = assemble(printed.mesh, part_set, told, spec)
     with stage("measure"):
         surfaces = surface.mesh.scaled(scale), simplified.mesh.scaled(scale)
-        metrics = measure_kit(*surfaces, printed, part_set, {})
+        metrics = measure_kit(*surfaces, printed, part_set, {}, patches, len(triangles.class_lengths))
     return Kit(
-        spec=_resolved(spec, surface, printed, part_set),
+        spec=_resolved(spec, surface, printed, part_set).model_copy(
+            update=_patch_choices(spec, patches, len(triangles.class_lengths), scale)
+        ),
         source=surface.source,
         surface=surfaces[0],
         simplified=surfaces[1],
@@ -81,6 +88,7 @@ def make_kit(source: str | Path | None = None, spec: KitSpec | None = None, prog
             *surface.notes,
             *simplified.notes,
             *printed.notes,
+            *(patches.notes if patches else ()),
             *part_set.notes,
             *size_notes(spec, printed.mesh),
             *_crossings(printed),
@@ -88,6 +96,7 @@ def make_kit(source: str | Path | None = None, spec: KitSpec | None = None, prog
         ),
         writer=write_kit,
         documents=make_documents,
+        patches=patches,
     )
 
 
@@ -168,3 +177,13 @@ def _resolved(spec: KitSpec, surface: Surface, printed: Decomposition, part_set:
             "mark_depth_mm": spec.preset.mark_depth_mm if spec.mark_depth_mm is None else spec.mark_depth_mm,
         }
     )
+
+
+def _patch_choices(spec: KitSpec, patches: Patches | None, triangle_classes: int, scale: float) -> dict[str, object]:
+    """The automatic choices of curved and merged pieces, in millimetres of the print."""
+    if patches is None or patches.allowance is None:
+        return {} if patches is None else {"curved_classes": spec.curved_classes_for(triangle_classes)}
+    allowance_mm = patches.allowance * scale
+    if spec.merge is not None:
+        return {"merge_tolerance_mm": allowance_mm}
+    return {"curved_classes": spec.curved_classes_for(triangle_classes), "curved_gap_mm": allowance_mm}

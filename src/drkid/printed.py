@@ -42,7 +42,7 @@ def structure_of(folder: Path, assembled: TriMesh, kit: KitDocument) -> Structur
             for name, part in parts.items()
         ],
         parts=[names.index(piece.part) for piece in kit.pieces],
-        faces=[piece.face for piece in kit.pieces],
+        faces=[piece.first_face for piece in kit.pieces],
         placements=np.array([piece.transform for piece in kit.pieces]).reshape(-1, 4, 4),
         targets=[assembled.vertices[list(piece.corners)] for piece in kit.pieces],
         bend_radians=np.radians([180 - joint.dihedral_degrees for joint in kit.joints]),

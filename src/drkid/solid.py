@@ -97,6 +97,11 @@ class Solid:
         """Carried by a 4×4 matrix, column-vector convention."""
         return Solid(self.body.transform(np.ascontiguousarray(matrix[:3, :4])))
 
+    def beyond(self, normal: Floats, level: float) -> "Solid":
+        """What lies on the side of the plane normal·p = level to which the normal (3,) points."""
+        length = float(np.linalg.norm(normal))
+        return Solid(self.body.trim_by_plane(tuple((normal / length).tolist()), level / length))
+
     # ---- measured
 
     @property

@@ -35,6 +35,9 @@ PRINTERS: dict[Printer, tuple[float, float, float]] = {
     "ultimaker-s5": (330.0, 240.0, 300.0),
 }
 """Build volumes X, Y, Z in mm, as their makers state them."""
+PatchKind = Literal["flat", "curved"]
+CurvedKind = Literal["canonical", "published"]
+Merge = Literal[2, 5, 6, 7]
 
 DEFAULT_FACES = 172  # the size of the paper's printed mitochondrion (table 1, M4)
 PRESSURE_CLASSES = 7  # of the same print
@@ -50,6 +53,7 @@ UNIVERSAL_BEVEL = (100.0, 114.0)
 FOLLOWING = ("bisector", "flippable")  # thickenings whose bevels follow the bends of the surface
 LEAST_RATIO, MOST_RATIO = 1.03, 1.6  # of given lengths: nearer ones are one length to a hand, others make slivers
 MOST_CLASSES = {2: 4, 3: 10}  # of a palette of two or three lengths
+DEPTHS, PUBLISHED_CLASSES = 2, 6  # curved shapes a class of triangles; the paper's number of curved classes
 MULTISETS = {1: "ssl", 2: "ssl,sll", 3: "sss,ssl,sll", 4: "sss,ssl,sll,lll"}  # of two lengths, by number of classes
 
 
@@ -311,6 +315,40 @@ class KitSpec(BaseModel):
     )
     net_on_one_page: bool = _field(False, "Output", "Shrink the whole net onto one page.")
 
+    patch: PatchKind = _field("flat", "Patches", "Flat triangles, or curved ones that follow the surface more closely.")
+    curved: CurvedKind = _field(
+        "canonical",
+        "Patches",
+        "Curved patches: canonical (one shape per class, any two sides of one length meet), or published (the paper's: "
+        "Loop subdivision, classified by curvature, alike to some percent).",
+    )
+    curved_classes: int | None = _field(
+        None,
+        "Patches",
+        f"Curved shapes in all; when not given {DEPTHS} a class of triangles (as many as there are classes: one each), "
+        f"{PUBLISHED_CLASSES} with --curved published.",
+        ge=1,
+    )
+    curved_gap_mm: float | None = _field(
+        None,
+        "Patches",
+        "Largest gap between the curved sides of canonical patches, at 95 of 100 joints; 1.5 clearances when not "
+        "given.",
+        gt=0,
+    )
+    subdivision_levels: int = _field(3, "Patches", "Subdivisions of a curved patch into 4 each: 3 make 64.", ge=1, le=4)
+    merge: Merge | None = _field(
+        None,
+        "Patches",
+        "Triangles merged into one piece: 2 (pairs), or 5, 6, 7 (whole stars of a vertex, and parts of stars).",
+    )
+    merge_tolerance_mm: float = _field(
+        0.02, "Patches", "Merged pieces that differ by no more at any corner are one shape.", gt=0, le=5
+    )
+    merge_flat_degrees: float = _field(
+        0.0, "Patches", "Merged pieces whose triangles bend by no more than this are made flat.", ge=0, le=45
+    )
+
     @model_validator(mode="before")
     @classmethod
     def _implied(cls, values: object) -> object:
@@ -334,7 +372,7 @@ class KitSpec(BaseModel):
         if self.faces is not None and self.classes > self.faces:
             message = f"classes is {self.classes}, more than the {self.faces} faces"
             raise ValueError(message)
-        contradiction = _contradiction(self) or _contradiction_of_pieces(self)
+        contradiction = _contradiction(self) or _contradiction_of_pieces(self) or _patch_contradiction(self)
         if contradiction:
             raise ValueError(contradiction)
         return self
@@ -369,6 +407,12 @@ class KitSpec(BaseModel):
         if self.vertices is not None:
             return 2 * self.vertices - 4 + 4 * genus
         return self.faces if self.faces is not None else DEFAULT_FACES
+
+    def curved_classes_for(self, triangle_classes: int) -> int:
+        """`curved_classes`, or what stands for it where triangles have so many classes."""
+        if self.curved_classes is not None:
+            return self.curved_classes
+        return PUBLISHED_CLASSES if self.curved == "published" else DEPTHS * triangle_classes
 
     def vertex_count(self, genus: int) -> int:
         """Vertices of the simplified mesh: as asked, or from the faces by Euler's formula F = 2V − 4 + 4g.
@@ -469,6 +513,13 @@ def _palette_contradiction(spec: KitSpec) -> str:
             return f"classes is {spec.classes}, multisets {spec.multisets} are {len(words)}: give one, not both"
     elif size is not None and spec.classes > MOST_CLASSES[size]:
         return f"classes is {spec.classes}: {size} lengths make {MOST_CLASSES[size]} kinds of triangles at most"
+    return ""
+
+
+def _patch_contradiction(spec: KitSpec) -> str:
+    """What is wrong between patch and merge; empty where nothing is."""
+    if spec.patch == "curved" and spec.merge is not None:
+        return f"patch is curved and merge is {spec.merge}: give one, merged pieces are made of flat triangles"
     return ""
 
 

@@ -69,7 +69,7 @@ def verify_kit(folder: str | Path) -> Verification:
     checks = (
         *_topology({SURFACE: surface, SIMPLIFIED: simplified, ASSEMBLED: assembled}, kit),
         _crossing(assembled),
-        *_congruence(assembled, face_class, kit),
+        *_congruence(assembled, kit),
         *_distances(surface, simplified, assembled, kit),
         *_angles(assembled, kit),
         *_rigidity(assembled, kit),
@@ -119,9 +119,26 @@ def _crossing(mesh: TriMesh) -> Check:
     return Check(f"{ASSEMBLED} does not cut itself", pairs == 0, f"{pairs} pairs of faces")
 
 
-def _congruence(mesh: TriMesh, face_class: Ints, kit: KitDocument) -> list[Check]:
-    lengths = np.array([c.edge_lengths for c in kit.classes])
-    errors = np.linalg.norm(np.sort(mesh.side_lengths, axis=1) - lengths[face_class], axis=1)
+def _owner(kit: KitDocument) -> dict[int, int]:
+    """The piece of every face."""
+    return {face: number for number, piece in enumerate(kit.pieces) for face in piece.covered}
+
+
+def _piece_errors(mesh: TriMesh, kit: KitDocument) -> Floats:
+    """(P,): distance of each piece's ascending outline lengths to its class's; infinite where the sides differ."""
+    lengths = {c.id: np.array(c.edge_lengths) for c in kit.classes}
+    errors = np.full(len(kit.pieces), np.inf)
+    for number, piece in enumerate(kit.pieces):
+        corners = mesh.vertices[piece.corners]
+        own = np.sort(np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1))
+        stated = lengths.get(piece.class_, np.empty(0))
+        if len(own) == len(stated):
+            errors[number] = np.linalg.norm(own - stated)
+    return errors
+
+
+def _congruence(mesh: TriMesh, kit: KitDocument) -> list[Check]:
+    errors = _piece_errors(mesh, kit)
     metrics, percent = kit.metrics, 100 / mesh.mean_edge
     tolerance = float(kit.spec["tolerance_percent"])
     reached = "converged" if errors.max() * percent <= tolerance else "stalled"
@@ -148,8 +165,10 @@ def _distances(surface: TriMesh, simplified: TriMesh, assembled: TriMesh, kit: K
 
 
 def _angles(mesh: TriMesh, kit: KitDocument) -> list[Check]:
-    found, stated = dihedral(mesh), kit.metrics.dihedral
-    edges = {tuple(edge): i for i, edge in enumerate(mesh.edges.tolist())}
+    owner = _owner(kit)
+    outer = np.array([owner.get(a, -1) != owner.get(b, -1) for a, b in mesh.edge_faces.tolist()])
+    found, stated = dihedral(mesh, outer), kit.metrics.dihedral
+    edges = {tuple(edge): i for i, edge in enumerate(mesh.edges.tolist()) if outer[i]}
     inner = 180 - np.degrees(bend_radians(mesh))
     named = {tuple(sorted(joint.edge)): joint.dihedral_degrees for joint in kit.joints}
     complete = set(named) == set(edges) and len(kit.joints) == len(edges)
@@ -180,11 +199,12 @@ def _rigidity(mesh: TriMesh, kit: KitDocument) -> list[Check]:
 def _counts(face_class: Ints, kit: KitDocument) -> Check:
     order = {c.id: i for i, c in enumerate(kit.classes)}
     by_part = Counter(piece.part for piece in kit.pieces)
+    covered = sorted(face for piece in kit.pieces for face in piece.covered)
     right = (
-        sorted(piece.face for piece in kit.pieces) == list(range(len(face_class)))
-        and all(order.get(piece.class_) == face_class[piece.face] for piece in kit.pieces)
+        covered == list(range(len(face_class)))
+        and all(order.get(piece.class_) == face_class[face] for piece in kit.pieces for face in piece.covered)
         and all(part.count == by_part[part.file] for c in kit.classes for part in c.parts)
-        and kit.metrics.pieces == len(face_class)
+        and kit.metrics.pieces == len(kit.pieces)
         and kit.metrics.unique_piece_parts == len(by_part)
     )
     return Check("counts", right, f"{len(face_class)} faces, {len(kit.pieces)} pieces, {len(by_part)} part files")
@@ -201,20 +221,26 @@ def _placement(mesh: TriMesh, kit: KitDocument) -> Check:
         turn = matrix[:3, :3]
         proper &= bool(np.abs(turn @ turn.T - np.eye(3)).max() < 1e-9 and np.linalg.det(turn) > 0)
         placed = corners[piece.part] @ turn.T + matrix[:3, 3]
-        worst = max(worst, float(np.linalg.norm(placed - mesh.vertices[list(piece.corners)], axis=1).max()))
-    limit = max(PLACEMENT_MM, PLACEMENT_OF_ERROR * kit.metrics.error_max)
+        worst = max(worst, float(np.linalg.norm(placed - mesh.vertices[piece.corners], axis=1).max()))
+    misfit = 0.0 if kit.metrics.merged is None else kit.metrics.merged.misfit_max_mm
+    limit = max(PLACEMENT_MM, PLACEMENT_OF_ERROR * kit.metrics.error_max, misfit)
     return Check("placement", proper and worst <= limit, f"corners within {worst:.4g} mm (limit {limit:.3g})")
 
 
 def _order(mesh: TriMesh, kit: KitDocument) -> Check:
-    beside = {(int(a), int(b)) for pair in mesh.edge_faces for a, b in (pair, pair[::-1])}
+    owner = _owner(kit)
+    pairs = [tuple(owner.get(face, -1) for face in pair) for pair in mesh.edge_faces.tolist()]
+    beside = {(a, b) for one, other in pairs for a, b in ((one, other), (other, one)) if a != b}
     done: set[int] = set()
     right = True
     for step in kit.assembly:
-        standing = {face for face in done if (step.face, face) in beside}
-        right &= set(step.joins) == standing and (bool(standing) or not done) and step.face not in done
-        done.add(step.face)
-    return Check("assembly order", right and len(done) == len(mesh.faces), f"{len(done)} of {len(mesh.faces)} placed")
+        own = owner.get(step.face, -1)
+        standing = {piece for piece in done if (own, piece) in beside}
+        right &= {owner.get(face, -1) for face in step.joins} == standing and len(step.joins) == len(standing)
+        right &= (bool(standing) or not done) and own not in done
+        done.add(own)
+    whole = right and done == set(range(len(kit.pieces)))
+    return Check("assembly order", whole, f"{len(done)} of {len(kit.pieces)} placed")
 
 
 def _parts(folder: Path, kit: KitDocument) -> Check:

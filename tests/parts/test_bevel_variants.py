@@ -4,9 +4,9 @@ from exact_shapes import decomposed, geodesic, icosahedron, potato, sixths
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drkid.class_triangle import is_equilateral
 from drkid.parts.bevel import bevel_groups, bisector_insets, demanded
 from drkid.parts.bevel_variants import bevel_variants, moulds
-from drkid.parts.class_triangle import is_equilateral
 from drkid.parts.members import members_of
 from drkid.spec import KitSpec
 

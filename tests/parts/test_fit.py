@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drkid.class_triangle import laid_down
 from drkid.errors import FitError
-from drkid.parts.class_triangle import laid_down
 from drkid.parts.dimensions import proposed
 from drkid.parts.fit import convex_distance, inradius, margins, smallest_scale
 from drkid.parts.pocket import pocket, side_frames

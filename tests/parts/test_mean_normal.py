@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from exact_shapes import decomposed, geodesic, icosahedron, potato, sixths
 
+from drkid.class_triangle import laid_down, symmetries
 from drkid.kit import Decomposition
-from drkid.parts.class_triangle import laid_down, symmetries
 from drkid.parts.mean_normal import leaning, mean_normal_slopes
 from drkid.parts.members import members_of
 

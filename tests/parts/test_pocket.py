@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from drkid.parts.class_triangle import laid_down
+from drkid.class_triangle import laid_down
 from drkid.parts.dimensions import proposed
 from drkid.parts.pocket import flare_mm, pocket, side_frames
 from drkid.spec import KitSpec

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drkid.parts.class_triangle import laid_down
+from drkid.class_triangle import laid_down
 from drkid.parts.prismoid import bevelled, side_insets
 
 insets = st.lists(st.floats(-1.5, 1.5), min_size=6, max_size=6).map(lambda x: np.reshape(x, (2, 3)))

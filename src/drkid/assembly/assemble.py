@@ -7,12 +7,23 @@ import numpy as np
 from drkid.assembly.closure import Play
 from drkid.assembly.order import steps
 from drkid.assembly.piece_graph import piece_graph
-from drkid.assembly.rigid_fit import rigid_fit
 from drkid.assembly.structure import Shape, Structure
-from drkid.kit import Assembly, AssemblyFigures, Building, Closure, Dimensions, Joint, PartSet, Piece, Swing
+from drkid.kit import (
+    Assembly,
+    AssemblyFigures,
+    Building,
+    Closure,
+    Dimensions,
+    Joint,
+    PartSet,
+    Piece,
+    Swing,
+    piece_of_face,
+)
 from drkid.measure import bend_radians
-from drkid.mesh import TriMesh, read_only
+from drkid.mesh import Ints, TriMesh, read_only
 from drkid.progress import Progress, silent
+from drkid.rigid_fit import rigid_fit
 from drkid.spec import KitSpec
 
 PLAIN = KitSpec()
@@ -21,39 +32,61 @@ PLAIN = KitSpec()
 def assemble(mesh_mm: TriMesh, part_set: PartSet, progress: Progress = silent, spec: KitSpec = PLAIN) -> Assembly:
     """Every part at its face of the connected closed mesh M_f in mm, the joints, a building order, and the proofs.
 
-    A piece's transform is the rigid motion that carries its part's corners nearest to the face's: what remains is
-    the difference between the face and its class. Joints are in the order of `mesh_mm.edges`; their angle is the
-    inner dihedral, 180° less the bend. Process and swing are the `spec`'s.
+    A piece's transform is the rigid motion that carries its part's corners nearest to their vertices: what remains is
+    the difference between the piece and its class. Joints are in the order of `mesh_mm.edges`, without those inside
+    of a merged piece; their angle is the inner dihedral, 180° less the bend. Process and swing are the `spec`'s.
     """
     progress("placing pieces", 0.0)
-    turned = (np.arange(3) + part_set.face_turn[:, None]) % 3
-    vertices = np.take_along_axis(mesh_mm.faces, turned, 1)
-    corners = np.stack([part.corners for part in part_set.parts])[part_set.face_part]
-    transforms = read_only(rigid_fit(corners, mesh_mm.vertices[vertices]))
-    pieces = tuple(
-        Piece(face, int(part_set.face_part[face]), (a, b, c), transforms[face])
-        for face, (a, b, c) in enumerate(vertices.tolist())
-    )
-    bend = bend_radians(mesh_mm)
+    pieces = _merged(mesh_mm, part_set) if part_set.merged else _triangles(mesh_mm, part_set)
+    bend, between = bend_radians(mesh_mm), _between_pieces(mesh_mm, part_set)
+    edges = mesh_mm.edges[between].tolist()
     joints = tuple(
         Joint((a, b), (v, w), float(180 - degrees))
         for (a, b), (v, w), degrees in zip(
-            mesh_mm.edge_faces.tolist(), mesh_mm.edges.tolist(), np.degrees(bend), strict=True
+            mesh_mm.edge_faces[between].tolist(), edges, np.degrees(bend[between]), strict=True
         )
     )
     structure = Structure(
-        graph=piece_graph([piece.vertices for piece in pieces], mesh_mm.edges.tolist()),
+        graph=piece_graph([piece.vertices for piece in pieces], edges),
         shapes=[Shape(part.corners, part.side_frames, part.solid) for part in part_set.parts],
         parts=[piece.part for piece in pieces],
         faces=[piece.face for piece in pieces],
-        placements=transforms,
+        placements=np.stack([piece.transform for piece in pieces]),
         targets=[mesh_mm.vertices[list(piece.vertices)] for piece in pieces],
-        bend_radians=bend,
+        bend_radians=bend[between],
         connector=part_set.dimensions.connector,
         connectors=[connector.solid for connector in part_set.connectors],
         play=_play(part_set.dimensions, spec),
     )
     return _proven(structure, pieces, joints, part_set.dimensions, spec, progress)
+
+
+def _triangles(mesh_mm: TriMesh, part_set: PartSet) -> tuple[Piece, ...]:
+    turned = (np.arange(3) + part_set.face_turn[:, None]) % 3
+    vertices = np.take_along_axis(mesh_mm.faces, turned, 1)
+    corners = np.stack([part.corners for part in part_set.parts])[part_set.face_part]
+    transforms = read_only(rigid_fit(corners, mesh_mm.vertices[vertices]))
+    return tuple(
+        Piece((face,), int(part_set.face_part[face]), (a, b, c), transforms[face])
+        for face, (a, b, c) in enumerate(vertices.tolist())
+    )
+
+
+def _merged(mesh_mm: TriMesh, part_set: PartSet) -> tuple[Piece, ...]:
+    pieces: list[Piece] = []
+    for piece in part_set.merged:
+        corners = part_set.parts[piece.class_index].corners
+        transform = read_only(rigid_fit(corners, mesh_mm.vertices[list(piece.vertices)]))
+        pieces.append(Piece(piece.faces, piece.class_index, piece.vertices, transform))
+    return tuple(pieces)
+
+
+def _between_pieces(mesh_mm: TriMesh, part_set: PartSet) -> Ints:
+    """The edges that are joints: all but those inside of a merged piece."""
+    if not part_set.merged:
+        return np.arange(len(mesh_mm.edges))
+    owner = piece_of_face(part_set.merged, len(mesh_mm.faces))[mesh_mm.edge_faces]
+    return np.flatnonzero(owner[:, 0] != owner[:, 1])
 
 
 def _proven(

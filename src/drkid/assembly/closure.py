@@ -7,10 +7,10 @@ import numpy as np
 from drkid.assembly.breadth_first import chained
 from drkid.assembly.hinge_framework import HingeFramework
 from drkid.assembly.relaxation import relaxed
-from drkid.assembly.rigid_fit import rigid_fit
 from drkid.assembly.tolerance import Response
 from drkid.kit import Closure, Drift, Gaps, ToleranceBudget, Verdict
 from drkid.mesh import Floats, Ints
+from drkid.rigid_fit import rigid_fit
 
 ROUNDING_MM = 1e-3  # a gap that no clearance is needed for: printed lengths are rounded
 STRAIN_PLAYS = 2.0  # times the play: 0.8 mm of FDM, of which the parts have to give half, about 1 % of a side of 35 mm

@@ -60,11 +60,24 @@ class PieceDocument(Model):
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True, serialize_by_alias=True)
 
-    face: Face
+    face: Face | None = None
+    faces: list[Face] | None = Field(default=None, description="of a merged kit, in place of face")
     class_: Annotated[str, Field(alias="class")]
     part: str
-    corners: tuple[Vertex, Vertex, Vertex] = Field(description="vertex of assembled.ply at each corner of the part")
+    corners: list[Vertex] = Field(min_length=3, description="vertex of assembled.ply at each corner of the part")
     transform: Matrix = Field(description="from part to world, proper rigid")
+
+    @property
+    def covered(self) -> list[int]:
+        """The faces of M_f that the piece covers; none where it names none."""
+        if self.faces is not None:
+            return self.faces
+        return [] if self.face is None else [self.face]
+
+    @property
+    def first_face(self) -> int:
+        """The first of them, by which steps and joints name the piece; −1 where it names none."""
+        return self.covered[0] if self.covered else -1
 
 
 class JointDocument(Model):
@@ -220,6 +233,39 @@ class AssemblyDocument(Model):
     building: BuildingDocument
 
 
+class CurvedDocument(Model):
+    """Of curved pieces; tangent breaks are the angles between tangent planes along the joints, flat: of triangles."""
+
+    threshold_percent: float = Field(description="T: largest distance to the class in (w, x, y, z), of the mean edge")
+    gap_mean_mm: float = Field(description="widest gap between the boundary curves at a joint")
+    gap_p95_mm: float
+    flat_break_mean_degrees: float
+    flat_break_p95_degrees: float
+    break_mean_degrees: float
+    break_p95_degrees: float
+    surface_curved: DistanceDocument = Field(description="surface.ply and the assembled curved patches")
+
+
+class MergedDocument(Model):
+    """Of merged pieces: what they were, and how far the farthest corner of each lies from its shape's."""
+
+    triangles: int
+    triangle_classes: int
+    single_triangles: int
+    misfit_mean_mm: float
+    misfit_max_mm: float
+
+
+class PatchDocument(Model):
+    """The curved middle surface of a class in its part frame, subdivided; corners 0, 1, 2 are the class's."""
+
+    class_: Annotated[str, Field(alias="class")]
+    vertices: list[Point]
+    faces: list[tuple[int, int, int]]
+
+    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True, serialize_by_alias=True)
+
+
 class MetricsDocument(Model):
     """What tables report."""
 
@@ -240,6 +286,8 @@ class MetricsDocument(Model):
     seconds: dict[str, float]
     assembly: AssemblyDocument | None = None
     unique_connector_parts: int | None = Field(default=None, ge=0, description="printed shapes of connectors")
+    curved: CurvedDocument | None = None
+    merged: MergedDocument | None = None
 
 
 class FindingDocument(Model):
@@ -292,3 +340,4 @@ class KitDocument(Model):
     outcome: OutcomeDocument
     notes: list[str] = Field(default=[], description="what a user should know about this kit")
     findings: list[FindingDocument] = Field(default=[], description="dimensions against what the process needs")
+    patches: list[PatchDocument] | None = Field(default=None, description="of curved kits: one for each class")

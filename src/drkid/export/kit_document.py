@@ -2,11 +2,13 @@
 
 from collections import Counter
 from dataclasses import asdict
+from math import isnan
 from typing import Any
 
 import numpy as np
 
 from drkid import __version__
+from drkid.curved_patch import barycentric_grid
 from drkid.export import document as doc
 from drkid.export.bill_of_materials import Moulding, Row, connector_row, moulding, piece_row, rod_row
 from drkid.export.layout import connector_file, part_file
@@ -31,7 +33,7 @@ def connector_names(kit: Kit) -> list[str]:
 def kit_document(kit: Kit) -> doc.KitDocument:
     """The whole of kit.json."""
     counts = Counter(piece.part for piece in kit.assembly.pieces)
-    connectors = connector_names(kit)
+    connectors, merged = connector_names(kit), bool(kit.part_set.merged)
     return doc.KitDocument(
         drkid_version=__version__,
         source=doc.SourceDocument(**asdict(kit.source), scale_mm_per_unit=kit.part_set.scale_mm_per_unit),
@@ -39,10 +41,11 @@ def kit_document(kit: Kit) -> doc.KitDocument:
         classes=_classes(kit, counts),
         pieces=[
             doc.PieceDocument(
-                face=piece.face,
+                face=None if merged else piece.face,
+                faces=list(piece.faces) if merged else None,
                 class_=class_id(kit.part_set.parts[piece.part].class_index),
                 part=part_name(kit.part_set.parts[piece.part]),
-                corners=piece.vertices,
+                corners=list(piece.vertices),
                 transform=_flat(piece.transform),
             )
             for piece in kit.assembly.pieces
@@ -67,7 +70,22 @@ def kit_document(kit: Kit) -> doc.KitDocument:
         outcome=doc.OutcomeDocument(**asdict(kit.decomposition.outcome)),
         notes=list(kit.notes),
         findings=[doc.FindingDocument(**asdict(finding)) for finding in kit.part_set.findings],
+        patches=_patches(kit),
     )
+
+
+def _patches(kit: Kit) -> list[doc.PatchDocument] | None:
+    """The curved patches in millimetres; None of a kit of flat pieces."""
+    if kit.patches is None or not kit.patches.curved:
+        return None
+    grid = barycentric_grid(kit.spec.subdivision_levels)
+    scale = kit.part_set.scale_mm_per_unit
+    return [
+        doc.PatchDocument(
+            class_=class_id(k), vertices=patch.scaled(scale).points(grid.points).tolist(), faces=grid.faces.tolist()
+        )
+        for k, patch in enumerate(kit.patches.curved)
+    ]
 
 
 def kit_summary(kit: Kit) -> dict[str, Any]:
@@ -123,7 +141,7 @@ def _classes(kit: Kit, counts: Counter[int]) -> list[doc.ClassDocument]:
             doc.ClassDocument(
                 id=class_id(index),
                 count=sum(counts[i] for i in numbers),
-                edge_lengths=lengths,
+                edge_lengths=[x for x in lengths if not isnan(x)],
                 mirror_symmetric=parts[0].handedness == "any",
                 parts=[
                     doc.PartDocument(
@@ -164,8 +182,11 @@ def _metrics(metrics: Metrics) -> doc.MetricsDocument:
 
     plain = asdict(metrics)
     names = set(doc.MetricsDocument.model_fields) & set(plain)
+    curved, merged = plain.pop("curved"), plain.pop("merged")
     return doc.MetricsDocument(
-        **{name: plain[name] for name in names},
+        **{name: plain[name] for name in names - {"curved", "merged"}},
+        curved=None if curved is None else doc.CurvedDocument(**curved),
+        merged=None if merged is None else doc.MergedDocument(**merged),
         hausdorff=doc.HausdorffDocument(
             surface_simplified=distance(metrics.surface_simplified),
             simplified_assembled=distance(metrics.simplified_assembled),

@@ -4,10 +4,10 @@ from math import ceil
 
 import numpy as np
 
+from drkid.class_triangle import equal_sides, is_equilateral
 from drkid.errors import FitError
 from drkid.measure import bend_radians
 from drkid.mesh import Floats, Ints, TriMesh
-from drkid.parts.class_triangle import equal_sides, is_equilateral
 from drkid.parts.members import Members
 from drkid.spec import KitSpec
 

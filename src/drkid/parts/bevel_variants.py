@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from drkid.class_triangle import is_equilateral
 from drkid.kit import Decomposition, class_id
 from drkid.mesh import Bools, Floats, Ints, read_only
 from drkid.parts.bevel import bevel_groups, demanded, flippable_insets
-from drkid.parts.class_triangle import is_equilateral
 from drkid.parts.members import Members, members_of
 from drkid.spec import FOLLOWING, KitSpec
 

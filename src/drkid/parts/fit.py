@@ -6,10 +6,10 @@ from math import cos, radians, sin
 
 import numpy as np
 
+from drkid.class_triangle import inward_normals
 from drkid.errors import FitError
 from drkid.kit import Dimensions
 from drkid.mesh import Floats
-from drkid.parts.class_triangle import inward_normals
 from drkid.parts.detent import groove
 from drkid.parts.pocket import depth_mm, flare_mm
 from drkid.parts.prismoid import Prismoid, side_insets

@@ -2,24 +2,23 @@
 
 import numpy as np
 
+from drkid.class_triangle import laid_down, printed_lengths
 from drkid.kit import Decomposition, Dimensions, GrooveChoice
 from drkid.mesh import Floats
 from drkid.parts.bevel_variants import Moulds, moulds
-from drkid.parts.class_triangle import laid_down, printed_lengths
 from drkid.parts.groove import groove_mm, recesses
+from drkid.parts.prismoid import Prismoid
 from drkid.parts.thickening import thickened
 from drkid.spec import FOLLOWING, KitSpec
 
 MOST_LOOKED_AT = 4  # variants of a class; more only where they are asked for
 
 
-def recesses_of(found: Moulds, dimensions: Dimensions, spec: KitSpec, scale: float) -> Floats:
-    """(F, 2, 3): how far each side stands back from the plane half-way to its neighbour (`groove.recesses`)."""
-    lengths = found.decomposition.class_lengths
-    shapes = thickened(lengths, found.members, dimensions, spec, scale)
-    triangles = laid_down(printed_lengths(lengths, scale))
+def recesses_of(found: Moulds, shapes: tuple[Prismoid, ...], scale: float) -> Floats:
+    """(F, 2, 3): how far each side of its mould's shape stands back from the plane half-way to its neighbour."""
+    triangles = laid_down(printed_lengths(found.decomposition.class_lengths, scale))
     insets = np.stack([shape.insets(triangle) for shape, triangle in zip(shapes, triangles, strict=True)])
-    return recesses(found.members, insets, scale, dimensions.thickness_mm)
+    return recesses(found.members, insets, scale, shapes[0].thickness_mm)
 
 
 def groove_choices(
@@ -36,6 +35,7 @@ def groove_choices(
         split = moulds(decomposition, own, count)
         if found and split.count == found[-1].moulds:
             break
-        width = groove_mm(decomposition.mesh, split.members, recesses_of(split, dimensions, own, scale))
+        shapes = thickened(split.decomposition.class_lengths, split.members, dimensions, own, scale)
+        width = groove_mm(decomposition.mesh, split.members, recesses_of(split, shapes, scale))
         found.append(GrooveChoice(count, split.count, float(width.mean()), float(width.max())))
     return tuple(found)

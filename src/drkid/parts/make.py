@@ -1,25 +1,28 @@
 """The one function of this stage."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import count
 from math import ceil, degrees
 
 import numpy as np
 
+from drkid.class_triangle import LEFT_CORNERS, is_mirror_symmetric, laid_down, printed_lengths
+from drkid.curved_patch import CurvedPatch
 from drkid.errors import FitError
-from drkid.kit import Connector, Decomposition, Dimensions, Handedness, Part, PartSet, class_id
+from drkid.kit import Connector, Decomposition, Dimensions, Handedness, Part, PartSet, Patches, class_id
 from drkid.mesh import Floats, Ints, read_only
 from drkid.parts.bevel import require_bends
 from drkid.parts.bevel_variants import Moulds, moulds
-from drkid.parts.class_triangle import LEFT_CORNERS, is_mirror_symmetric, laid_down, printed_lengths
 from drkid.parts.coupon import coupon
-from drkid.parts.dimensions import proposals
+from drkid.parts.curved_piece import curved_solid, needed_thickness_mm, raised
+from drkid.parts.dimensions import THICKNESS_STEP_MM, proposals
 from drkid.parts.fit import FITS_MM, Margin, margins, smallest_scale
 from drkid.parts.groove import groove_mm
 from drkid.parts.groove_choices import groove_choices, recesses_of
 from drkid.parts.hinge import hinge_half
 from drkid.parts.key import box_key
+from drkid.parts.make_merged import merged_parts
 from drkid.parts.marks import marked
 from drkid.parts.members import Members
 from drkid.parts.notes import groove_notes, notes
@@ -36,16 +39,21 @@ FIRST_GUESS_THICKNESSES = 4.0  # mean edge of the pieces with which the search f
 WHOLE_MM = 1e-6
 MOST_OF_SIDE = 0.4  # of the shortest side: how wide a pocket may be that is proposed for its strength
 SMALLER = 1 - 1e-4  # of a scale: what another connector must save to be taken
+MOST_THICKENINGS = 12  # of curved pieces, each of which may need a larger size; two or three do
+MOST_BEVEL_OF_REACH = 0.5  # of a connector's reach: what the bevels of curved pieces may leave without walls
 
 
-def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress = silent) -> PartSet:
+def make_parts(
+    decomposition: Decomposition, spec: KitSpec, progress: Progress = silent, patches: Patches | None = None
+) -> PartSet:
     """The printed shapes of a kit: pieces with bevels and pockets, connectors, and which face uses which.
 
     One piece a class where it is its own mirror image, a left and a right one where it is not and both are used;
     `spec.bevel_variants` of each. An equilateral piece is laid down in the way that narrows its bevels.
     The scale is the decomposition's own where given edge lengths fix it. Else it makes the longest side of the mesh's
     bounding box `spec.size_mm`, or is the smallest at which all pockets and walls fit, rounded up to whole mm of that
-    side. The inner face of each is marked.
+    side. The inner face of each is marked, if it is flat. With curved `patches` the decomposition is theirs, and pieces
+    are as thick as the patches need; with merged ones it is that of the triangles.
 
     Raises:
         FitError: pockets and walls do not fit at the asked size or thickness, a piece is larger than the bed, or a
@@ -57,20 +65,17 @@ def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress =
     bends = spec.bevel_degrees or (degrees(float(np.abs(members.bend_radians).max())),)
     sharpest = max(bends) + spec.swing_degrees
     progress("finding the size", 0.2)
-    design = _chosen([_Design(found, d, spec) for d in proposals(spec, sharpest)])
-    scale = _scale(design)
+    curved = tuple(patches.curved[k] for k in found.class_index) if patches and patches.curved else ()
+    design = _chosen([_Design(found, d, spec, curved) for d in proposals(spec, sharpest)])
+    design, scale = _scaled(design)
     require_bends(decomposition.mesh.scaled(scale), spec)
     progress("cutting parts", 0.5)
     shapes = design.pieces(scale)
-    parts, face_part = _parts(design, shapes, scale)
-    parts, unmarked = _marked(parts, design)
-    for part in parts:
-        _require_bed(part, spec)
-    recess = recesses_of(found, design.dimensions, spec, scale)
+    recess = recesses_of(found, shapes, scale)
     width = groove_mm(decomposition.mesh, members, recess)
-    choices = groove_choices(decomposition, design.dimensions, spec, scale)
-    progress("cutting parts", 1.0)
-    return PartSet(
+    choices = () if curved else groove_choices(decomposition, design.dimensions, spec, scale)
+    parts, face_part = _parts(design, shapes, scale)
+    part_set = PartSet(
         scale_mm_per_unit=scale,
         dimensions=design.dimensions,
         parts=parts,
@@ -78,13 +83,20 @@ def make_parts(decomposition: Decomposition, spec: KitSpec, progress: Progress =
         face_part=face_part,
         face_turn=members.turn,
         groove_mm=read_only(width),
-        notes=(*notes(found, design.dimensions, spec, recess, scale), *groove_notes(width, choices, spec), *unmarked),
+        notes=(*notes(found, design.dimensions, spec, recess, scale), *groove_notes(width, choices, spec)),
         findings=findings(
             design.triangles(scale), shapes, np.unique(members.face_class).tolist(), found, design.dimensions, spec
         ),
         groove_choices=choices,
         coupon=coupon(design.dimensions, spec),
     )
+    if patches is not None and patches.merged:
+        part_set = merged_parts(patches, part_set, spec)
+    part_set = _marked(part_set, spec)
+    for part in part_set.parts:
+        _require_bed(part, spec)
+    progress("cutting parts", 1.0)
+    return part_set
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +106,7 @@ class _Design:
     moulds: Moulds
     dimensions: Dimensions
     spec: KitSpec
+    curved: tuple[CurvedPatch, ...] = ()
 
     @property
     def decomposition(self) -> Decomposition:
@@ -118,7 +131,27 @@ class _Design:
         return laid_down(printed_lengths(self.decomposition.class_lengths, scale))
 
     def pieces(self, scale: float) -> tuple[Prismoid, ...]:
-        return thickened(self.decomposition.class_lengths, self.members, self.dimensions, self.spec, scale)
+        flat = thickened(self.decomposition.class_lengths, self.members, self.dimensions, self.spec, scale)
+        if not self.curved:
+            return flat
+        zipped = zip(flat, self.triangles(scale), self.curved, strict=True)
+        return tuple(raised(piece, triangle, patch.scaled(scale)) for piece, triangle, patch in zipped)
+
+    def needed_thickness_mm(self, scale: float) -> float:
+        """What the curved patches ask for; 0 where pieces are flat."""
+        zipped = zip(self.triangles(scale), self.curved, strict=False)
+        return max((needed_thickness_mm(t, p.scaled(scale), self.dimensions) for t, p in zipped), default=0.0)
+
+    def needed_depth_mm(self, scale: float) -> float:
+        """How deep pockets of curved pieces are, so that their bevels, deeper than flat ones', leave the hold.
+
+        0 where pieces are flat or have no pockets.
+        """
+        if not self.curved or self.dimensions.connector == "none":
+            return 0.0
+        zipped = zip(self.pieces(scale), self.triangles(scale), strict=True)
+        deepest = max(float(piece.insets(triangle).max()) for piece, triangle in zipped)
+        return deepest / MOST_BEVEL_OF_REACH + 2 * self.dimensions.clearance_mm
 
     def tightest(self, scale: float) -> tuple[int, Margin]:
         """The mould with the least slack of those in use, and where."""
@@ -166,6 +199,34 @@ def _chosen(designs: list[_Design]) -> _Design:
     return best
 
 
+def _scaled(design: _Design) -> tuple[_Design, float]:
+    """The scale, and the design with pieces as thick as curved patches need at it: they dip more the larger they are.
+
+    Raises:
+        FitError: a thickness is given that is less.
+    """
+    for _ in range(MOST_THICKENINGS):
+        scale, dimensions = _scale(design), design.dimensions
+        thickness, depth = _stepped(design.needed_thickness_mm(scale)), _stepped(design.needed_depth_mm(scale))
+        if max(thickness - dimensions.thickness_mm, depth - dimensions.pocket_depth_mm) <= WHOLE_MM:
+            return design, scale
+        if thickness > dimensions.thickness_mm and design.spec.thickness_mm is not None:
+            break
+        thickness, depth = max(thickness, dimensions.thickness_mm), max(depth, dimensions.pocket_depth_mm)
+        design = replace(design, dimensions=replace(dimensions, thickness_mm=thickness, pocket_depth_mm=depth))
+    raise FitError(
+        "the curved patches dip so far under their triangles that the pockets would lose their roof",
+        wanted=f"thickness_mm of {design.needed_thickness_mm(_scale(design)):.2f} at least",
+        found=f"{design.dimensions.thickness_mm:g}",
+        remedy="thicker pieces (--thickness-mm), fewer --curved-classes, or --patch flat",
+    )
+
+
+def _stepped(length_mm: float) -> float:
+    """Rounded up to the steps in which thicknesses are proposed."""
+    return round(ceil(length_mm / THICKNESS_STEP_MM - WHOLE_MM) * THICKNESS_STEP_MM, 6)
+
+
 def _scale(design: _Design) -> float:
     fixed = design.decomposition.scale_mm_per_unit
     if fixed is not None:
@@ -209,19 +270,23 @@ def _parts(design: _Design, shapes: tuple[Prismoid, ...], scale: float) -> tuple
     """The parts in use, by class and bevel variant, right before left, and which one each face is made from."""
     members, parts = design.members, list[Part]()
     face_part = np.empty(len(members.face_class), np.int64)
-    for index, triangle in enumerate(design.triangles(scale)):
+    for index in range(len(shapes)):
         own = members.face_class == index
         hands = [left for left in (False, True) if (own & (members.left == left)).any()]
-        right = _right_part(design, index, triangle, shapes[index]) if hands else None
+        right = _right_part(design, index, shapes[index], scale) if hands else None
         for left in hands:
             face_part[own & (members.left == left)] = len(parts)
             parts += [] if right is None else [_mirrored(right, design.dimensions) if left else right]
     return tuple(parts), read_only(face_part)
 
 
-def _right_part(design: _Design, index: int, triangle: Floats, shape: Prismoid) -> Part:
+def _right_part(design: _Design, index: int, shape: Prismoid, scale: float) -> Part:
+    triangle = design.triangles(scale)[index]
     frames = side_frames(triangle, design.dimensions.key_bend_degrees / 2)
     solid = shape.solid
+    if design.curved:
+        patch, levels = design.curved[index].scaled(scale), design.spec.subdivision_levels
+        solid = curved_solid(triangle, patch, shape, design.dimensions, levels)
     if design.dimensions.connector != "none":
         solid = solid.minus_all([pocket(design.dimensions).moved(frame) for frame in frames])
     symmetric = is_mirror_symmetric(design.decomposition.class_lengths[index])
@@ -237,20 +302,24 @@ def _mirrored(right: Part, dimensions: Dimensions) -> Part:
     return Part(right.class_index, "left", _flat(triangle), frames, right.solid.moved(MIRROR), right.variant)
 
 
-def _marked(parts: tuple[Part, ...], design: _Design) -> tuple[tuple[Part, ...], tuple[str, ...]]:
+def _marked(part_set: PartSet, spec: KitSpec) -> PartSet:
     """The parts with their marks, and a note for each that has no room for one."""
-    spec, notes_ = design.spec, list[str]()
     depth = spec.preset.mark_depth_mm if spec.mark_depth_mm is None else spec.mark_depth_mm
     if not spec.marks or depth == 0:
-        return parts, ()
-    made: list[Part] = []
-    for part in parts:
-        found, missing = marked(part, design.dimensions, spec.preset.engrave_width_mm, depth)
+        return part_set
+    if spec.patch == "curved" or part_set.merged:
+        kind = "Curved" if spec.patch == "curved" else "Merged"
+        return replace(
+            part_set, notes=(*part_set.notes, f"{kind} pieces have no one plane inside: they bear no marks.")
+        )
+    made, notes_ = list[Part](), list[str]()
+    for part in part_set.parts:
+        found, missing = marked(part, part_set.dimensions, spec.preset.engrave_width_mm, depth)
         made.append(found)
         hand = "" if part.handedness == "any" else f" ({part.handedness})"
         if missing:
             notes_.append(f"Class {part.name}{hand}: no room for the {', '.join(missing)} inside.")
-    return tuple(made), tuple(notes_)
+    return replace(part_set, parts=tuple(made), notes=(*part_set.notes, *notes_))
 
 
 def _flat(triangle: Floats) -> Floats:

@@ -8,9 +8,9 @@ import numpy as np
 from numba import njit
 from scipy.ndimage import map_coordinates
 
+from drkid.class_triangle import SAME_LENGTH
 from drkid.kit import Dimensions, Part
 from drkid.mesh import Floats, Ints
-from drkid.parts.class_triangle import SAME_LENGTH
 from drkid.parts.detent import groove
 from drkid.parts.stroke_font import strokes
 from drkid.solid import Solid

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from drkid.class_triangle import laid_down, symmetries
 from drkid.mesh import Floats, read_only
-from drkid.parts.class_triangle import laid_down, symmetries
 from drkid.parts.members import Members
 from drkid.parts.prismoid import Prismoid
 

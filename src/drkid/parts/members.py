@@ -4,12 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drkid.class_triangle import LEFT_CORNERS, LEFT_SIDES, inward_normals, laid_down, laid_on, symmetrised
 from drkid.kit import Decomposition
 from drkid.measure import bend_radians
 from drkid.mesh import Bools, Floats, Ints, TriMesh, read_only
-from drkid.parts.class_triangle import LEFT_CORNERS, LEFT_SIDES, equal_sides, inward_normals, laid_down
-
-TIE = 1e-12  # of the squared length: ways to lay a part that differ by less fit equally well, the first is taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +37,8 @@ def members_of(decomposition: Decomposition, turned: Ints | int = 0) -> Members:
     An equilateral piece fits its face in three ways; `turned` (F,) says by how many sides more to turn each.
     """
     mesh, face_class = decomposition.mesh, decomposition.face_class
-    lengths = _symmetrised(decomposition.class_lengths)
-    left, turn = _laid(mesh.side_lengths, lengths, face_class)
+    lengths = symmetrised(decomposition.class_lengths)
+    left, turn = laid_on(mesh.side_lengths, lengths, face_class)
     turn = (turn + turned) % 3
     face_side = (np.where(left[:, None], LEFT_SIDES, (0, 1, 2)) + turn[:, None]) % 3
     face_corner = (np.where(left[:, None], LEFT_CORNERS, (0, 1, 2)) + turn[:, None]) % 3
@@ -56,34 +54,6 @@ def members_of(decomposition: Decomposition, turned: Ints | int = 0) -> Members:
         read_only(offsets.max(axis=2)),
         read_only(_local_normals(mesh, face_corner, rotation)),
     )
-
-
-def _symmetrised(class_lengths: Floats) -> Floats:
-    """The lengths with equal ones made exactly equal, so that rounding decides nothing."""
-    out = np.array(class_lengths)
-    for row in out:
-        group = equal_sides(row)
-        row[:] = (np.bincount(group, weights=row) / np.bincount(group))[group]
-    return out
-
-
-def _laid(side_lengths: Floats, lengths: Floats, face_class: Ints) -> tuple[Bools, Ints]:
-    """Which hand (F,) and turn (F,) lay each face's sides (F, 3) best on those of its class.
-
-    Right goes before left where both fit alike, as they do in a class with equal sides: such a piece is only turned.
-    """
-    wanted = lengths[face_class]
-    mismatch = np.stack(
-        [
-            ((side_lengths[:, (np.array(sides) + turn) % 3] - wanted) ** 2).sum(axis=1)
-            for sides in ((0, 1, 2), LEFT_SIDES)
-            for turn in range(3)
-        ],
-        axis=1,
-    )
-    allowed = mismatch.min(axis=1) + TIE * (wanted**2).sum(axis=1)
-    choice = np.argmax(mismatch <= allowed[:, None], axis=1)
-    return choice >= 3, (choice % 3).astype(np.int64)
 
 
 def _fitted(face_lengths: Floats, class_lengths: Floats) -> tuple[Floats, Floats]:

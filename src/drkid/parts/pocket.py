@@ -4,9 +4,9 @@ from math import cos, radians, sin, tan
 
 import numpy as np
 
+from drkid.class_triangle import inward_normals
 from drkid.kit import Dimensions
 from drkid.mesh import Floats, read_only
-from drkid.parts.class_triangle import inward_normals
 from drkid.parts.detent import grooves
 from drkid.solid import Solid
 
@@ -57,7 +57,12 @@ def side_frames(triangle: Floats, lean_degrees: float = 0.0) -> Floats:
     frames[:, :2, 1] = normal
     frames[:, :2, 3] = (triangle + following) / 2
     frames[:, 2, 2] = frames[:, 3, 3] = 1.0
+    return read_only(frames @ leaning_turn(lean_degrees))
+
+
+def leaning_turn(lean_degrees: float) -> Floats:
+    """(4, 4): the turn about x that leans a frame's y inwards."""
     lean = radians(lean_degrees)
     turn = np.eye(4)
     turn[1:3, 1:3] = [[cos(lean), sin(lean)], [-sin(lean), cos(lean)]]
-    return read_only(frames @ turn)
+    return turn

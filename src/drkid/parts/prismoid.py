@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from drkid.class_triangle import inward_normals
 from drkid.mesh import Floats, read_only
-from drkid.parts.class_triangle import inward_normals
 from drkid.solid import Solid
 
 

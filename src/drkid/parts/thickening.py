@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from drkid.class_triangle import laid_down, printed_lengths
 from drkid.kit import Dimensions
 from drkid.mesh import Floats
 from drkid.parts.bevel import bevel_insets, bisector_insets, demanded, flippable_insets, limited, ridged, ridges
-from drkid.parts.class_triangle import laid_down, printed_lengths
 from drkid.parts.dimensions import deepest_bevel_mm, held_height_mm
 from drkid.parts.mean_normal import leaning, mean_normal_slopes
 from drkid.parts.members import Members

@@ -100,7 +100,7 @@ def _pieces(scene: Scene, part_number: dict[str, int], figures: dict[str, Floats
         joints[b].append((a, round(joint.dihedral_degrees, 2)))
     return [
         {
-            "face": piece.face,
+            "face": piece.first_face,
             "step": int(scene.piece_step[i]),
             "class": int(scene.piece_class[i]),
             "part": part_number[piece.part],

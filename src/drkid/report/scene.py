@@ -44,7 +44,7 @@ class Scene:
     @cached_property
     def face_piece(self) -> dict[int, int]:
         """The piece that a face of M_f belongs to."""
-        return {piece.face: i for i, piece in enumerate(self.document.pieces)}
+        return {face: i for i, piece in enumerate(self.document.pieces) for face in piece.covered}
 
     @cached_property
     def piece_step(self) -> Ints:

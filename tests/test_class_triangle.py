@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drkid.parts.class_triangle import (
+from drkid.class_triangle import (
     equal_sides,
     inward_normals,
     is_mirror_symmetric,

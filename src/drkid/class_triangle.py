@@ -4,9 +4,10 @@ from itertools import permutations
 
 import numpy as np
 
-from drkid.mesh import Floats, Ints
+from drkid.mesh import Bools, Floats, Ints
 
 SAME_LENGTH = 2e-5  # relative: sides that differ by less are equal; far below what any process can print
+TIE = 1e-12  # of the squared length: ways to lay a part that differ by less fit equally well, the first is taken
 DECIMALS = 9  # of a printed length in mm
 LEFT_SIDES = (0, 2, 1)  # which class side lies at side i of a left part: ascending clockwise from outside
 LEFT_CORNERS = (1, 0, 2)  # which corner of the right part mirrors to corner i of the left part
@@ -65,3 +66,31 @@ def symmetries(lengths: Floats) -> list[tuple[tuple[int, ...], Floats]]:
             matrix = np.linalg.solve(corners[:2], corners[list(permutation[:2])]).T
             found.append((permutation, matrix.astype(np.float64)))
     return found
+
+
+def symmetrised(class_lengths: Floats) -> Floats:
+    """The lengths with equal ones made exactly equal, so that rounding decides nothing."""
+    out = np.array(class_lengths)
+    for row in out:
+        group = equal_sides(row)
+        row[:] = (np.bincount(group, weights=row) / np.bincount(group))[group]
+    return out
+
+
+def laid_on(side_lengths: Floats, lengths: Floats, face_class: Ints) -> tuple[Bools, Ints]:
+    """Which hand (F,) and turn (F,) lay each face's sides (F, 3) best on those of its class.
+
+    Right goes before left where both fit alike, as they do in a class with equal sides: such a piece is only turned.
+    """
+    wanted = lengths[face_class]
+    mismatch = np.stack(
+        [
+            ((side_lengths[:, (np.array(sides) + turn) % 3] - wanted) ** 2).sum(axis=1)
+            for sides in ((0, 1, 2), LEFT_SIDES)
+            for turn in range(3)
+        ],
+        axis=1,
+    )
+    allowed = mismatch.min(axis=1) + TIE * (wanted**2).sum(axis=1)
+    choice = np.argmax(mismatch <= allowed[:, None], axis=1)
+    return choice >= 3, (choice % 3).astype(np.int64)

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from drkid.assembly.rigid_fit import rigid_fit
+from drkid.rigid_fit import rigid_fit
 
 
 @given(st.integers(0, 10_000))

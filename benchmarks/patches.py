@@ -1,0 +1,126 @@
+"""Curved and merged pieces of real shapes: planar, curved as the paper has it, canonical; triangles merged.
+
+One decomposition a shape (172 faces, two classes), from it every kind of piece. T is the paper's measure in
+(w, x, y, z), moulds are printed shapes, mirror images apart, d_H is the mean distance to the surface of the scan in
+percent of its box. Prints two tables and writes results/patches.json.
+
+    python benchmarks/patches.py               about ten minutes
+    python benchmarks/patches.py --shapes golgi_vesicle.mrc
+"""
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+from real_shapes import LABELS, require_data
+
+from drkid.congruence import decompose
+from drkid.kit import Decomposition, Surface
+from drkid.measure import bend_radians, hausdorff
+from drkid.metrics import SAMPLING_SEED
+from drkid.parts import make_parts
+from drkid.patches import make_patches
+from drkid.pipeline import read_surface
+from drkid.remesh import simplify
+from drkid.spec import KitSpec
+
+SHAPES = ("urocell_mito_bean.nii.gz", "golgi_vesicle.mrc", "asteroid_itokawa.obj")
+ROUNDS = 5  # of the palette solver
+CURVED: tuple[tuple[str, dict[str, object]], ...] = (
+    ("planar", {}),
+    ("published", {"patch": "curved", "curved": "published", "curved_classes": 6}),
+    ("published", {"patch": "curved", "curved": "published", "curved_classes": 10}),
+    ("canonical", {"patch": "curved", "curved_classes": 2}),
+    ("canonical", {"patch": "curved", "curved_classes": 4}),
+)
+MERGES, TOLERANCES_MM = (2, 5, 6, 7), (0.02, 0.2, 1.0)
+Row = dict[str, float | int | str]
+
+
+def curved_row(surface: Surface, decomposition: Decomposition, kind: str, options: dict[str, object]) -> Row:
+    """One row of the first table."""
+    spec = KitSpec.parse(options)
+    patches = make_patches(decomposition, surface.mesh, spec)
+    parts = make_parts(decomposition if patches is None else patches.decomposition, spec, patches=patches)
+    figures = None if patches is None else patches.figures
+    bend = np.abs(np.degrees(bend_radians(decomposition.mesh)))
+    assembled = decomposition.mesh if figures is None else figures.surface
+    apart = hausdorff(surface.mesh, assembled, np.random.default_rng(SAMPLING_SEED))
+    scale, percent = parts.scale_mm_per_unit, 100 / surface.mesh.diagonal
+    errors = 100 * decomposition.face_errors.max() / decomposition.mesh.mean_edge
+    return {
+        "kind": kind,
+        "k": len(decomposition.class_lengths) if patches is None else len(patches.curved),
+        "t_percent": float(errors) if figures is None else figures.threshold_percent,
+        "moulds": len(parts.parts),
+        "gap_p95_mm": 0.0 if figures is None else float(np.percentile(figures.gap, 95)) * scale,
+        "clearance_mm": parts.dimensions.clearance_mm,
+        "break_mean_degrees": float(bend.mean()) if figures is None else figures.break_mean,
+        "break_p95_degrees": float(np.percentile(bend, 95)) if figures is None else figures.break_p95,
+        "distance_mean_percent": apart.mean * percent,
+        "distance_max_percent": apart.max * percent,
+        "thickness_mm": parts.dimensions.thickness_mm,
+        "mean_edge_mm": decomposition.mesh.mean_edge * scale,
+    }
+
+
+def merged_row(decomposition: Decomposition, surface: Surface, merge: int, tolerance_mm: float, size_mm: float) -> Row:
+    """One row of the second table, at the size of the print of the unmerged triangles."""
+    spec = KitSpec.parse({"merge": merge, "merge_tolerance_mm": tolerance_mm, "size_mm": size_mm})
+    patches = make_patches(decomposition, surface.mesh, spec)
+    assert patches is not None, "merge was asked for"
+    assert patches.misfit is not None, "merged pieces have a misfit"
+    scale = size_mm / float(decomposition.mesh.extents.max())
+    return {
+        "merge": merge,
+        "tolerance_mm": tolerance_mm,
+        "triangles": len(decomposition.mesh.faces),
+        "triangle_moulds": len(decomposition.class_lengths),
+        "pieces": len(patches.pieces),
+        "moulds": len(patches.merged),
+        "single_triangles": sum(len(piece.faces) == 1 for piece in patches.pieces),
+        "misfit_max_mm": float(patches.misfit.max()) * scale,
+    }
+
+
+def measured(path: Path, only: str) -> dict[str, object]:
+    """Both tables of one shape, or one of them."""
+    spec = KitSpec.parse({"rounds": ROUNDS, "label": LABELS.get(path.name)})
+    surface = read_surface(path, spec)
+    decomposition = decompose(simplify(surface, spec).mesh, spec, surface=surface.mesh)
+    curved = [curved_row(surface, decomposition, *row) for row in (CURVED[:1] if only == "merged" else CURVED)]
+    size = float(curved[0]["mean_edge_mm"]) / decomposition.mesh.mean_edge * float(decomposition.mesh.extents.max())
+    wanted = [] if only == "curved" else [(m, t) for m in MERGES for t in TOLERANCES_MM]
+    merged = [merged_row(decomposition, surface, m, t, size) for m, t in wanted]
+    return {"shape": path.name, "faces": len(decomposition.mesh.faces), "curved": curved, "merged": merged}
+
+
+def printed(rows: list[Row]) -> None:
+    """A table, its columns named by the keys."""
+    print("  " + " | ".join(rows[0]))
+    for row in rows:
+        print("  " + " | ".join(f"{x:.3g}" if isinstance(x, float) else str(x) for x in row.values()), flush=True)
+
+
+def main() -> None:
+    """Measure, print, write."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--shapes", default=",".join(SHAPES), help="files of the data folder")
+    parser.add_argument("--only", choices=("curved", "merged", "both"), default="both", help="one of the tables")
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results" / "patches.json")
+    arguments = parser.parse_args()
+    data = require_data()
+    found = []
+    for name in arguments.shapes.split(","):
+        result = measured(data / name, arguments.only)
+        found.append(result)
+        print(name, result["faces"], "faces")
+        printed(result["curved"])  # type: ignore[arg-type]
+        if result["merged"]:
+            printed(result["merged"])  # type: ignore[arg-type]
+    arguments.out.write_text(json.dumps(found, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

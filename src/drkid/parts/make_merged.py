@@ -1,0 +1,102 @@
+"""Parts of merged pieces: at the size and with the dimensions at which the triangles themselves would fit."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from drkid.kit import Dimensions, Handedness, MergedClass, MergedPiece, Part, PartSet, Patches
+from drkid.measure import bend_radians
+from drkid.mesh import Floats, TriMesh, read_only
+from drkid.parts.bevel import bevel_insets, flippable_insets
+from drkid.parts.dimensions import deepest_bevel_mm
+from drkid.parts.merged_piece import demanded, merged_solid, outline_bends, outline_frames, shared_insets
+from drkid.parts.pocket import pocket
+from drkid.spec import FOLLOWING, KitSpec
+
+MOST_MIDDLE_INSET = 0.45  # of the thickness: how far a side may stand back from the hinge axis at mid-height
+
+
+def merged_parts(patches: Patches, of_triangles: PartSet, spec: KitSpec) -> PartSet:
+    """The part set of merged pieces, from that of the same triangles unmerged.
+
+    Every triangle of a piece keeps its pockets on the outline, and a piece has no pocket that its triangles did not
+    have room for: what fits unmerged fits merged.
+    """
+    scale, dimensions = of_triangles.scale_mm_per_unit, of_triangles.dimensions
+    mesh_mm = patches.decomposition.mesh.scaled(scale)
+    shapes = tuple(_scaled(shape, scale) for shape in patches.merged)
+    insets = [
+        _insets(mesh_mm, shape, [p for p in patches.pieces if p.class_index == k], dimensions, spec)
+        for k, shape in enumerate(shapes)
+    ]
+    parts = tuple(_part(k, shape, insets[k], dimensions) for k, shape in enumerate(shapes))
+    face_part = np.zeros(len(mesh_mm.faces), np.int64)
+    for piece in patches.pieces:
+        face_part[list(piece.faces)] = piece.class_index
+    return replace(
+        of_triangles,
+        parts=parts,
+        face_part=read_only(face_part),
+        face_turn=read_only(np.zeros(len(face_part), np.int64)),
+        groove_mm=read_only(_grooves(mesh_mm, patches.pieces, insets, dimensions)),
+        merged=patches.pieces,
+    )
+
+
+def _scaled(shape: MergedClass, scale: float) -> MergedClass:
+    return replace(shape, corners=read_only(shape.corners * scale), inner=read_only(shape.inner * scale))
+
+
+def _insets(
+    mesh_mm: TriMesh, shape: MergedClass, members: list[MergedPiece], dimensions: Dimensions, spec: KitSpec
+) -> Floats:
+    """(2, n): by the rule that is asked for; bent pieces have no one normal, so mean_normal is the mean bevel."""
+    thickness, sides = dimensions.thickness_mm, len(shape.corners)
+    if spec.bevel_degrees is not None:
+        insets = np.repeat(bevel_insets(spec.bevel_degrees, thickness, spec.swing_degrees), sides, axis=1)
+    elif spec.thickening in FOLLOWING:
+        insets = shared_insets([demanded(mesh_mm, shape, p, thickness, spec.swing_degrees) for p in members], shape)
+    elif spec.thickening == "mean_normal":
+        insets = np.mean([demanded(mesh_mm, shape, p, thickness, 0.0) for p in members], axis=0)
+    else:
+        insets = np.zeros((2, sides))
+    if spec.thickening == "flippable":
+        insets = flippable_insets(insets)
+    return _held(insets, dimensions)
+
+
+def _held(insets_mm: Floats, dimensions: Dimensions) -> Floats:
+    """Insets (2, n) of bevels of one plane cut down to what leaves the connector its hold, at the faces and amid."""
+    insets = np.minimum(insets_mm, deepest_bevel_mm(dimensions))
+    excess = insets.mean(axis=0, keepdims=True) - MOST_MIDDLE_INSET * dimensions.thickness_mm
+    return insets - np.maximum(excess, 0.0)
+
+
+def _part(index: int, shape: MergedClass, insets_mm: Floats, dimensions: Dimensions) -> Part:
+    frames = outline_frames(shape, dimensions.key_bend_degrees / 2)
+    solid = merged_solid(shape, insets_mm, dimensions.thickness_mm)
+    if dimensions.connector != "none":
+        solid = solid.minus_all([pocket(dimensions).moved(frame) for frame in frames])
+    return Part(index, _handedness(shape), shape.corners, frames, solid)
+
+
+def _handedness(shape: MergedClass) -> Handedness:
+    """'any' of a shape that is its own mirror image, else 'right'; of triangles by the order of their sides."""
+    if shape.achiral:
+        return "any"
+    lengths = np.linalg.norm(np.roll(shape.corners, -1, axis=0) - shape.corners, axis=1)
+    return "left" if len(lengths) == 3 and lengths[1] > lengths[2] else "right"
+
+
+def _grooves(mesh_mm: TriMesh, pieces: tuple[MergedPiece, ...], insets: list[Floats], dimensions: Dimensions) -> Floats:
+    """(J,): widest gap at each joint, in the order of the mesh's edges; as `groove.groove_mm`."""
+    half = dimensions.thickness_mm / 2
+    total = np.zeros((2, len(mesh_mm.edges)))
+    outer = np.zeros(len(mesh_mm.edges), np.bool_)
+    for piece in pieces:
+        bend, edges = outline_bends(mesh_mm, piece)
+        recess = insets[piece.class_index] + np.array([[-half], [half]]) * np.tan(bend / 2)
+        for height in range(2):
+            np.add.at(total[height], edges, recess[height])
+        outer[edges] = True
+    return np.maximum(total.max(axis=0) * np.cos(bend_radians(mesh_mm) / 2), 0.0)[outer]

@@ -1,0 +1,132 @@
+"""Merged piece: several triangles as one bent solid, its outline bevelled and pocketed side by side."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from drkid.kit import MergedClass, MergedPiece
+from drkid.measure import bend_radians
+from drkid.mesh import Floats, Ints, TriMesh, read_only
+from drkid.parts.bevel import SHARPEST_JOINT_DEGREES
+from drkid.parts.pocket import leaning_turn
+from drkid.rigid_fit import rigid_fit
+from drkid.solid import Solid
+
+SKIRT_MM = 1.0  # beyond what stands out of the outline; the bevels cut it away
+MITRE = 1e-3  # singular values below this share are left out: triangles in one plane have one normal
+
+
+def outline_frames(shape: MergedClass, lean_degrees: float = 0.0) -> Floats:
+    """(n, 4, 4): connector to part coordinates at every side of the outline: z is the normal of the triangle there.
+
+    y leans inwards, as in `pocket.side_frames`.
+    """
+    following = np.roll(shape.corners, -1, axis=0)
+    x = following - shape.corners
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    z = _face_normals(shape)[shape.side_face]
+    frames = np.zeros((len(x), 4, 4))
+    frames[:, :3, 0], frames[:, :3, 1], frames[:, :3, 2] = x, np.cross(z, x), z
+    frames[:, :3, 3] = (shape.corners + following) / 2
+    frames[:, 3, 3] = 1.0
+    return read_only(frames @ leaning_turn(lean_degrees))
+
+
+def outline_bends(mesh: TriMesh, piece: MergedPiece) -> tuple[Floats, Ints]:
+    """Bend (n,) of the mesh at each side of a piece's outline, in radians, and the edge (n,) that it is."""
+    number = {tuple(edge): i for i, edge in enumerate(mesh.edges.tolist())}
+    around = [*piece.vertices, piece.vertices[0]]
+    edges = [number[min(a, b), max(a, b)] for a, b in pairwise(around)]
+    return bend_radians(mesh)[edges], np.array(edges, np.int64)
+
+
+def demanded(
+    mesh_mm: TriMesh, shape: MergedClass, piece: MergedPiece, thickness_mm: float, swing_degrees: float
+) -> Floats:
+    """(2, n): least inset of each side at the inner and outer face for one member, as `bevel.demanded` of triangles."""
+    swing, most = np.radians(swing_degrees), np.radians(SHARPEST_JOINT_DEGREES)
+    bend, _ = outline_bends(mesh_mm, piece)
+    low, high = (np.tan(np.clip(bend + s, -most, most) / 2) for s in (-swing, swing))
+    corners = mesh_mm.vertices[list(piece.vertices)]
+    motion = rigid_fit(corners, shape.corners)
+    corners = corners @ motion[:3, :3].T + motion[:3, 3]
+    inward = outline_frames(shape)[:, :3, 1]
+    ends = np.stack([corners - shape.corners, np.roll(corners - shape.corners, -1, axis=0)])
+    far = np.einsum("esk,sk->es", ends, inward).max(axis=0)
+    return far + thickness_mm / 2 * np.stack([high, -low])
+
+
+def shared_insets(demands: list[Floats], shape: MergedClass) -> Floats:
+    """(2, n): insets that serve all members, the same on sides that are mirror images, none over the hinge axis."""
+    insets = np.max(demands, axis=0)
+    if shape.mirror:
+        n = len(shape.mirror)
+        image = [shape.mirror[(i + 1) % n] for i in range(n)]  # side i runs backwards to the image of its end
+        insets = np.maximum(insets, insets[:, image])
+    return insets + np.maximum(-insets.mean(axis=0, keepdims=True), 0.0)
+
+
+def merged_solid(shape: MergedClass, insets_mm: Floats, thickness_mm: float) -> Solid:
+    """The piece before its pockets are cut: its triangles thick and mitred at their folds, cut by its sides' bevels.
+
+    `insets_mm` (2, n) are those of the sides at the inner and the outer face. A bevel's plane cuts the whole piece,
+    which is what a convex outline allows.
+    """
+    frames = outline_frames(shape)
+    slope = (insets_mm[1] - insets_mm[0]) / thickness_mm
+    normals = frames[:, :3, 1] - slope[:, None] * frames[:, :3, 2]
+    levels = np.einsum("sk,sk->s", normals, frames[:, :3, 3]) + insets_mm.mean(axis=0)
+    skirt = max(-float(insets_mm.min()), 0.0) + SKIRT_MM
+    solid = Solid.of(slab_mesh(shape, skirt, thickness_mm))
+    for normal, level in zip(normals, levels, strict=True):
+        solid = solid.beyond(normal, float(level))
+    return solid
+
+
+def slab_mesh(shape: MergedClass, skirt_mm: float, thickness_mm: float) -> TriMesh:
+    """The triangles, carried on beyond the outline by a skirt in their own planes, at half the thickness either way.
+
+    Every point moves along the mitre of its triangles' normals, so that no triangle is thinner than stated: it keeps
+    its thickness where no more than three planes meet, and is a little thicker elsewhere.
+    """
+    normals, n = _face_normals(shape), len(shape.corners)
+    points = np.vstack([shape.corners, shape.inner])
+    around = [np.flatnonzero((shape.faces == i).any(axis=1)) for i in range(len(points))]
+    at_side = [np.unique([shape.side_face[i - 1], shape.side_face[i]]) for i in range(n)]
+    mitre = np.stack([_mitre(normals[own]) for own in [*around, *at_side]])
+    points = np.vstack([points, shape.corners + skirt_mm * _outward(shape)])
+    count, shift, a = len(points), mitre * thickness_mm / 2, np.arange(n)
+    b, s = np.roll(a, -1), a + count - n
+    t = np.roll(s, -1)
+    upper = np.vstack([shape.faces, np.stack([b, a, s], axis=1), np.stack([b, s, t], axis=1)])
+    walls = [np.stack([s, t, t + count], axis=1), np.stack([s, t + count, s + count], axis=1)]
+    return TriMesh(np.vstack([points - shift, points + shift]), np.vstack([upper[:, ::-1], upper + count, *walls]))
+
+
+def _outward(shape: MergedClass) -> Floats:
+    """(n, 3): where a corner goes if both of its sides move outwards by 1 at least, each in the plane of its triangle.
+
+    Along the fold where one meets the corner; else half-way between the sides, where several do only nearly in plane.
+    """
+    frames, n = outline_frames(shape), len(shape.corners)
+    inward = frames[:, :3, 1]
+    points = np.vstack([shape.corners, shape.inner])
+    out = np.empty((n, 3))
+    for i in range(n):
+        own = shape.faces[(shape.faces == i).any(axis=1)]
+        direction = -(inward[i - 1] + inward[i])
+        if len(own) == 2:
+            far = next(v for v in np.intersect1d(own[0], own[1]) if v != i)
+            direction = points[i] - points[far]
+        out[i] = direction / -max(inward[i - 1] @ direction, inward[i] @ direction)
+    return out
+
+
+def _face_normals(shape: MergedClass) -> Floats:
+    return TriMesh(np.vstack([shape.corners, shape.inner]), shape.faces).face_normals
+
+
+def _mitre(normals: Floats) -> Floats:
+    """(3,): the shift that moves every plane with one of these normals (m, 3) by 1, or little more where it cannot."""
+    shift = np.linalg.pinv(normals, rcond=MITRE) @ np.ones(len(normals))
+    return shift / (normals @ shift).min()

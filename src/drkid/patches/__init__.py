@@ -1,0 +1,5 @@
+"""Classes of triangles to curved patches, or to pieces that are merged of several triangles."""
+
+from drkid.patches.make import make_patches
+
+__all__ = ["make_patches"]

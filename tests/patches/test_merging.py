@@ -1,0 +1,86 @@
+from collections import Counter
+
+import numpy as np
+import pytest
+import trimesh
+
+from drkid.kit import Decomposition, Outcome
+from drkid.mesh import TriMesh
+from drkid.patches.matching import paired
+from drkid.patches.merging import merged_patches
+from drkid.patches.outline import WIDEST, outlined
+from drkid.patches.vertex_star import starred
+from drkid.spec import KitSpec
+
+
+def icosahedron() -> TriMesh:
+    ico = trimesh.creation.icosahedron()
+    return TriMesh(np.asarray(ico.vertices), np.asarray(ico.faces))
+
+
+def one_class(mesh: TriMesh) -> Decomposition:
+    lengths = np.sort(mesh.side_lengths, axis=1)
+    errors = np.linalg.norm(lengths - lengths.mean(axis=0), axis=1)
+    zeros = np.zeros(len(mesh.faces), np.int64)
+    return Decomposition(mesh, zeros, lengths.mean(axis=0)[None], errors, 0, (), Outcome("converged", ""))
+
+
+def test_a_matching_covers_every_face_once_by_neighbours(pebble) -> None:
+    pairs = paired(pebble, 0.01)
+    assert Counter(map(len, pairs)) == {2: len(pebble.faces) // 2}
+    assert sorted(f for pair in pairs for f in pair) == list(range(len(pebble.faces)))
+    beside = {frozenset(p) for p in pebble.edge_faces.tolist()}
+    assert all(frozenset(pair) in beside for pair in pairs)
+
+
+@pytest.mark.parametrize("size", [5, 6, 7])
+def test_stars_are_disjoint_whole_or_convex_parts(pebble, size) -> None:
+    groups = starred(pebble, size, 0.01)
+    assert sorted(f for group in groups for f in group) == list(range(len(pebble.faces)))
+    whole = {len(group) for group in groups if len(outlined(pebble, group).inner) == 1}
+    assert whole <= set(range(3, size + 1))
+    assert size in whole or not (pebble.valence == size).any()
+    for group in groups:
+        piece = outlined(pebble, group)
+        common = set.intersection(*(set(pebble.faces[f].tolist()) for f in group))
+        assert common, "all triangles of a star meet at its middle"
+        assert len(piece.inner) == (1 if len(group) == pebble.valence[min(common)] and len(group) > 2 else 0)
+        assert piece.widest_angle(pebble) <= WIDEST
+
+
+def test_an_icosahedron_merges_into_one_shape() -> None:
+    for merge, pieces in ((2, 10), (5, 8)):
+        found = merged_patches(one_class(icosahedron()), KitSpec(merge=merge), 1e-6)
+        assert found.misfit == pytest.approx(np.zeros(len(found.pieces)), abs=1e-9)
+        if merge == 2:
+            assert len(found.pieces) == pieces
+            assert len(found.merged) == 1
+            assert found.merged[0].achiral
+        else:
+            assert Counter(len(p.faces) for p in found.pieces)[5] >= 2
+            assert len(found.merged) < len(found.pieces)
+
+
+def test_a_looser_tolerance_needs_no_more_shapes(pebble) -> None:
+    counts = [len(merged_patches(one_class(pebble), KitSpec(merge=2), t).merged) for t in (1e-6, 0.3)]
+    assert counts[0] > counts[1]
+
+
+def test_corners_lie_within_the_tolerance_of_their_shape(pebble) -> None:
+    tolerance = 0.1
+    found = merged_patches(one_class(pebble), KitSpec(merge=6), tolerance)
+    assert found.misfit is not None
+    assert found.misfit.max() <= tolerance + 1e-9
+    lengths = found.decomposition.class_lengths
+    for piece in found.pieces:
+        shape = found.merged[piece.class_index]
+        assert len(piece.vertices) == len(shape.corners) == int((~np.isnan(lengths[piece.class_index])).sum())
+
+
+def test_gently_bent_pieces_are_made_flat(pebble) -> None:
+    bent = merged_patches(one_class(pebble), KitSpec(merge=2), 0.01)
+    flat = merged_patches(one_class(pebble), KitSpec(merge=2, merge_flat_degrees=45), 0.01)
+    assert max(np.abs(c.corners[:, 2]).max() for c in bent.merged) > 1e-3
+    assert max(np.abs(c.corners[:, 2]).max() for c in flat.merged) < 1e-12
+    assert flat.misfit is not None
+    assert flat.misfit.max() > 0.01
