@@ -13,6 +13,7 @@ from drkid.report.guide_html import guide_html
 from drkid.report.guide_pages import guide_pages
 from drkid.report.guide_pdf import guide_pdf
 from drkid.report.net import net_files
+from drkid.report.part_picture import part_picture
 from drkid.report.report import report_html
 from drkid.report.scene import scene_of
 
@@ -27,7 +28,10 @@ def _guide(kit: Kit) -> dict[str, bytes]:
 
 
 def _report(kit: Kit) -> dict[str, bytes]:
-    return {REPORT: report_html(scene_of(kit), parts_list(kit, printed_meshes(kit))).encode()}
+    meshes = printed_meshes(kit)
+    rows = parts_list(kit, meshes)
+    pictures = {row.file: part_picture(meshes[row.file], row.colour) for row in rows if row.file and row.colour}
+    return {REPORT: report_html(scene_of(kit), rows, pictures).encode()}
 
 
 _MAKERS: tuple[tuple[str, Callable[[Kit], dict[str, bytes]]], ...] = (

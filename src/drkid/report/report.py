@@ -2,6 +2,7 @@
 
 import base64
 import json
+from collections.abc import Mapping
 from functools import cache
 from html import escape
 from importlib.resources import files
@@ -24,8 +25,11 @@ GHOST_FACES = 8000  # of M_i in the page
 MATRIX_DIGITS = 6  # after the point, of mm and of direction cosines: far below a pixel
 
 
-def report_html(scene: Scene, parts_list: list[Row]) -> str:
-    """The page, self-contained: data, styles, scripts and the licence of three.js are in it."""
+def report_html(scene: Scene, parts_list: list[Row], pictures: Mapping[str, bytes]) -> str:
+    """The page, self-contained: data, styles, scripts and the licence of three.js are in it.
+
+    `pictures` are those of the parts, PNG by the part's file.
+    """
     document = scene.document
     metrics, pieces = document.metrics, len(document.pieces)
     moulds = f"{metrics.unique_piece_parts} mould{'s' if metrics.unique_piece_parts > 1 else ''}"
@@ -44,7 +48,7 @@ def report_html(scene: Scene, parts_list: list[Row]) -> str:
         data=json_in_html(_data(scene)),
         pieces=str(pieces),
         classes=classes_table(document),
-        parts=parts_table(parts_list),
+        parts=parts_table(parts_list, pictures),
         histogram=_histogram(scene),
         convergence=_convergence(scene),
         table=paper_table(document),

@@ -1,7 +1,8 @@
 """Tables of the report as HTML; every text is escaped."""
 
+import base64
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from html import escape
 from importlib.resources import files
@@ -64,12 +65,20 @@ def classes_table(document: KitDocument) -> str:
     return table(("class", "pieces", "files", "sides in mm", "mirror image"), rows)
 
 
-def parts_table(rows: Sequence[Row]) -> str:
-    """The parts list, with those columns that say something."""
+def parts_table(rows: Sequence[Row], pictures: Mapping[str, bytes]) -> str:
+    """The parts list, with those columns that say something and the pictures of the parts, PNG by file."""
     plain = [asdict(row) for row in rows]
     names = [name for name in plain[0] if any(row[name] not in (None, "") for row in plain)] if plain else []
-    cells = [[_coloured(name, row[name]) for name in names] for row in plain]
-    return table([name.replace("_", " ").replace("mm3", "mm³") for name in names], cells)
+    cells = [[_pictured(row, pictures), *(_coloured(name, row[name]) for name in names)] for row in plain]
+    return table(["", *(name.replace("_", " ").replace("mm3", "mm³") for name in names)], cells)
+
+
+def _pictured(row: dict[str, Any], pictures: Mapping[str, bytes]) -> Html:
+    picture = pictures.get(row["file"])
+    if picture is None:
+        return Html("")
+    data = base64.b64encode(picture).decode("ascii")
+    return Html(f'<img src="data:image/png;base64,{data}" alt="{escape(row["part"])} from inside" height="72">')
 
 
 def _coloured(name: str, value: Any) -> object:

@@ -1,0 +1,15 @@
+"""The picture of a part, for its line in the parts list."""
+
+from drkid.mesh import TriMesh
+from drkid.report.colouring import channels
+from drkid.report.picture import Body, camera, render
+from drkid.report.png import png_bytes
+
+AZIMUTH_DEGREES, ELEVATION_DEGREES = -60.0, -40.0  # from inside, where pockets and marks are
+WIDTH, HEIGHT = 96, 72  # in pixels
+
+
+def part_picture(mesh: TriMesh, colour: str) -> bytes:
+    """A part in its colour (#RRGGBB) as PNG, seen from its inner side."""
+    view = camera(AZIMUTH_DEGREES, ELEVATION_DEGREES)
+    return png_bytes(render([Body(mesh, channels(colour))], view, WIDTH, HEIGHT))
