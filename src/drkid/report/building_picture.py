@@ -56,7 +56,10 @@ class Builder:
         piece = np.repeat(np.arange(len(self._placed)), [len(polygons) for polygons in self._placed])[polygon]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         outwards = np.einsum("nk,nk->n", normal, self.guide.scene.transforms[piece][:, :3, 2])
-        return corners, piece, outwards > OUTER_COSINE * np.linalg.norm(normal, axis=1)
+        cosine = outwards / np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)
+        most = np.zeros(len(self._placed))  # 1 but for a bent piece, whose faces all lean
+        np.maximum.at(most, piece, cosine)
+        return corners, piece, cosine > OUTER_COSINE * most[piece]
 
     @cached_property
     def _outer_area(self) -> Floats:
