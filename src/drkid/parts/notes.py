@@ -20,14 +20,15 @@ def notes(moulds: Moulds, dimensions: Dimensions, spec: KitSpec, recess_mm: Floa
     members = moulds.members
     touching = touching_mm(moulds.decomposition.mesh, members, recess_mm, scale)
     return (
-        *_connector_notes(members, dimensions),
+        *connector_notes(members, dimensions),
         *_touching_notes(touching, spec),
         *_short_notes(moulds, dimensions, spec, recess_mm, scale),
         *_limit_notes(members, spec),
     )
 
 
-def _connector_notes(members: Members, dimensions: Dimensions) -> Iterator[str]:
+def connector_notes(members: Members, dimensions: Dimensions) -> Iterator[str]:
+    """How the connector is put in; of merged pieces too."""
     if dimensions.connector == "none":
         return
     open_inwards = "Pockets are open to the inner face:"
