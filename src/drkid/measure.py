@@ -8,6 +8,7 @@ import numpy as np
 from drkid.mesh import Bools, Floats, Ints, TriMesh, read_only
 
 CONCAVE_DEGREES = 1.0  # a joint counts as concave when its inner angle is above 180° by more than this
+NORMAL_SMOOTHING = 5  # rounds of averaging of vertex normals: voxels leave ripples in them
 HAUSDORFF_SAMPLES = 60_000  # per direction: the mean is then good to about 0.5 % of itself
 
 
@@ -102,3 +103,14 @@ def smallest_angle_degrees(mesh: TriMesh) -> float:
     """The smallest angle of any face (law of cosines)."""
     a, b, c = np.sort(mesh.side_lengths, axis=1).T
     return float(np.degrees(np.arccos(np.clip((b * b + c * c - a * a) / (2 * b * c), -1, 1))).min())
+
+
+def smooth_normals(mesh: TriMesh) -> Floats:
+    """(V, 3): unit vertex normals, averaged with their neighbours a few times."""
+    normals, edges = mesh.vertex_normals.copy(), mesh.edges
+    for _ in range(NORMAL_SMOOTHING):
+        total = normals.copy()
+        np.add.at(total, edges[:, 0], normals[edges[:, 1]])
+        np.add.at(total, edges[:, 1], normals[edges[:, 0]])
+        normals = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), np.finfo(float).tiny)
+    return normals

@@ -8,9 +8,8 @@ import numpy as np
 from numba import njit
 
 from drkid.congruence.closest_point import TriangleTree, closest_slots, triangle_tree
+from drkid.measure import smooth_normals
 from drkid.mesh import Floats, Ints, TriMesh
-
-NORMAL_SMOOTHING = 5  # rounds of averaging of the target's vertex normals: voxels leave ripples in them
 
 
 class Surface(NamedTuple):
@@ -54,18 +53,7 @@ class Target:
     @cached_property
     def surface(self) -> Surface:
         """In arrays, for kernels."""
-        return Surface(triangle_tree(self.mesh), np.array(self.mesh.faces), self._normals)
-
-    @cached_property
-    def _normals(self) -> Floats:
-        """(V, 3): vertex normals, averaged with their neighbours a few times."""
-        normals, edges = self.mesh.vertex_normals.copy(), self.mesh.edges
-        for _ in range(NORMAL_SMOOTHING):
-            total = normals.copy()
-            np.add.at(total, edges[:, 0], normals[edges[:, 1]])
-            np.add.at(total, edges[:, 1], normals[edges[:, 0]])
-            normals = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
-        return normals
+        return Surface(triangle_tree(self.mesh), np.array(self.mesh.faces), smooth_normals(self.mesh))
 
     def offsets(self, points: Floats) -> tuple[Floats, Floats]:
         """Signed distance (n,) of points (n, 3) along the target's normals (n, 3), positive outside."""

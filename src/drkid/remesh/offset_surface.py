@@ -6,12 +6,10 @@ move them about at that height needs the surface of that height, not M_i.
 
 import numpy as np
 
-from drkid.measure import project
-from drkid.mesh import Floats, TriMesh
+from drkid.measure import project, smooth_normals
+from drkid.mesh import TriMesh
 from drkid.remesh.closest_point import ClosestPoint
 from drkid.remesh.surface_fit import barycentric
-
-NORMAL_SMOOTHING = 5  # rounds of averaging of the normals: voxels leave ripples in them
 
 
 def offset_surface(closest: ClosestPoint, mesh: TriMesh) -> TriMesh:
@@ -23,14 +21,4 @@ def offset_surface(closest: ClosestPoint, mesh: TriMesh) -> TriMesh:
     there, face = project(mesh, surface.vertices)
     weights = barycentric(mesh.corners[face], there)
     rise = np.einsum("ij,ij->i", weights, height[mesh.faces[face]])
-    return surface.moved(surface.vertices + rise[:, None] * _smooth_normals(surface))
-
-
-def _smooth_normals(mesh: TriMesh) -> Floats:
-    normals, edges = mesh.vertex_normals.copy(), mesh.edges
-    for _ in range(NORMAL_SMOOTHING):
-        total = normals.copy()
-        np.add.at(total, edges[:, 0], normals[edges[:, 1]])
-        np.add.at(total, edges[:, 1], normals[edges[:, 0]])
-        normals = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), np.finfo(float).tiny)
-    return normals
+    return surface.moved(surface.vertices + rise[:, None] * smooth_normals(surface))
