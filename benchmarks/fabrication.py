@@ -26,8 +26,8 @@ from drkid.verification import verify_kit
 
 HERE = Path(__file__).parent
 SOLVERS = {
-    "palette 2": {"classes": 2, "rounds": 3},
-    "palette 4": {"classes": 4, "rounds": 3},
+    "palette 2": {"classes": 2, "rounds": 20},
+    "palette 4": {"classes": 4, "rounds": 20},
     "pressure 7": {"method": "pressure", "classes": 7},
 }
 PROCESSES = ("fdm", "sla", "injection")

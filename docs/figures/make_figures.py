@@ -30,7 +30,7 @@ from drkid.assembly import assemble
 from drkid.class_triangle import laid_down
 from drkid.congruence.annealing import Schedule, anneal
 from drkid.congruence.framework import Framework
-from drkid.congruence.hop import START_DAMPING, START_HEAT, START_STEPS_PER_FACE, START_WEIGHTS
+from drkid.congruence.hop import START_DAMPING, START_HEAT, START_ITERATIONS, START_STEPS_PER_FACE, START_WEIGHTS
 from drkid.congruence.labelling import nearest_labels
 from drkid.congruence.levenberg_marquardt import solve
 from drkid.congruence.palette import Palette, palette_of_classes
@@ -579,14 +579,13 @@ def relabelled(frame: Framework, target: Target, palette: Palette) -> Framework:
     rng = np.random.default_rng(0)
     every = np.ones(len(frame.labels), np.bool_)
     for weight in START_WEIGHTS:
-        for _ in range(2):
-            model, net = quadratic_model(frame, target, weight, START_DAMPING), connectivity(frame.mesh)
-            labels, (short, long) = frame.labels.copy(), frame.lengths
-            heat = START_HEAT * float((1 - np.diag(model.coupling)).mean() * (long - short) ** 2)
-            schedule = Schedule(heat, START_STEPS_PER_FACE * len(net.faces), 0.0, np.flatnonzero(every), every)
-            anneal(net, model, labels, frame.lengths, palette.allowed.copy(), rng, schedule)
-            vertices = frame.mesh.vertices + model.shift.reshape(-1, 3)
-            frame, _ = solve(Framework(frame.mesh.moved(vertices), labels, frame.lengths), target, weight, "scale", 4)
+        model, net = quadratic_model(frame, target, weight, START_DAMPING), connectivity(frame.mesh)
+        labels, (short, long) = frame.labels.copy(), frame.lengths
+        heat = START_HEAT * float((1 - np.diag(model.coupling)).mean() * (long - short) ** 2)
+        schedule = Schedule(heat, START_STEPS_PER_FACE * len(net.faces), 0.0, np.flatnonzero(every), every)
+        anneal(net, model, labels, frame.lengths, palette.allowed.copy(), rng, schedule)
+        frame = Framework(frame.mesh.moved(frame.mesh.vertices + model.shift.reshape(-1, 3)), labels, frame.lengths)
+        frame, _ = solve(frame, target, weight, "scale", START_ITERATIONS)
     return frame
 
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import igl
 import numpy as np
+from scipy.sparse import csr_array
 
 from drkid.mesh import Bools, Floats, Ints, TriMesh, read_only
 
@@ -107,10 +108,10 @@ def smallest_angle_degrees(mesh: TriMesh) -> float:
 
 def smooth_normals(mesh: TriMesh) -> Floats:
     """(V, 3): unit vertex normals, averaged with their neighbours a few times."""
-    normals, edges = mesh.vertex_normals.copy(), mesh.edges
+    normals, (a, b) = mesh.vertex_normals, mesh.edges.T
+    rows, columns = np.concatenate([a, b]), np.concatenate([b, a])
+    adjacency = csr_array((np.ones(len(rows)), (rows, columns)), shape=(len(normals),) * 2)
     for _ in range(NORMAL_SMOOTHING):
-        total = normals.copy()
-        np.add.at(total, edges[:, 0], normals[edges[:, 1]])
-        np.add.at(total, edges[:, 1], normals[edges[:, 0]])
+        total = normals + adjacency @ normals
         normals = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), np.finfo(float).tiny)
     return normals

@@ -6,6 +6,7 @@ import pytest
 from drkid.congruence.hop import (
     LOCAL,
     REHEATS,
+    START_WEIGHTS,
     Anneal,
     Problem,
     annealed,
@@ -116,7 +117,7 @@ def test_drawn_anneals_lie_in_their_ranges():
 
 def test_the_model_is_stationary_where_it_says(problem, soft):
     """H y = −gradient, and the residual and coupling are those of y and H⁻¹."""
-    model = quadratic_model(soft, problem.target, 0.3, 0.05)
+    model = quadratic_model(soft, problem.target, START_WEIGHTS[-1], 0.05)
     assert model.inverse == pytest.approx(model.inverse.T)
     assert np.linalg.eigvalsh(model.coupling).min() > -1e-9
     assert np.diag(model.coupling).max() < 1

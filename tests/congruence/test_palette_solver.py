@@ -125,12 +125,25 @@ def test_hops_on_a_large_mesh_never_make_it_worse(pebble, monkeypatch):
     assert ranks[palette_solver.ROUNDS - 1 :] == sorted(ranks[palette_solver.ROUNDS - 1 :], reverse=True)
 
 
-def test_a_mesh_too_large_for_dense_starts_is_made_exact_by_repairing_folds(pebble, monkeypatch):
-    monkeypatch.setattr(palette_solver, "MOST_DENSE_FACES", 60)
-    solver = PaletteSolver(KitSpec(method="palette", classes=4, rounds=12), pebble)
+def test_the_first_starts_are_an_answer_and_the_others_the_first_round(pebble, monkeypatch):
+    solver = PaletteSolver(KitSpec(method="palette", classes=2, rounds=1), pebble)
+    first = solver.init(pebble)
+    assert len(first.walks) == palette_solver.FIRST_STARTS
+    assert first.best.percent < 10
+    assert solver.finished(first) is None
+    second = solver.step(first)
+    assert len(second.walks) == palette_solver.WALKS
+    assert [walk.found.rank for walk in second.walks] == sorted(walk.found.rank for walk in second.walks)
+    assert second.found.rank <= first.found.rank
+    monkeypatch.setattr(palette_solver, "MANY_FACES", 60)
+    assert len(solver.step(first).walks) == palette_solver.FEW_WALKS
+
+
+def test_what_starts_leave_is_made_exact_by_repairing_folds(pebble, monkeypatch):
+    monkeypatch.setattr(palette_solver, "MANY_FACES", 60)
+    solver = PaletteSolver(KitSpec(method="palette", classes=4, rounds=24), pebble)
     state = solver.init(pebble)
-    assert len(state.walks) == palette_solver.BLOCK_STARTS
-    assert state.found.exact or all(walk.descent is not None for walk in state.walks)
+    assert all(walk.descent is not None for walk in state.walks)
     while solver.finished(state) is None:
         state = solver.step(state)
     assert state.found.exact

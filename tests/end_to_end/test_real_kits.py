@@ -25,7 +25,7 @@ GOOD = {
 @pytest.fixture(scope="module")
 def nucleus(tmp_path_factory):
     """As by default, but for fewer pieces and fewer rounds than ten seconds hold."""
-    kit = drkid.make_kit(None, drkid.KitSpec(faces=100, rounds=3))
+    kit = drkid.make_kit(None, drkid.KitSpec(faces=100, rounds=20))
     return kit, kit.write(tmp_path_factory.mktemp("nucleus") / "kit")
 
 
@@ -96,13 +96,13 @@ def test_the_volume_of_the_printed_object_is_that_of_the_voxels(nucleus):
 def test_the_seed_decides_the_kit(nucleus):
     kit, _ = nucleus
     again = drkid.make_kit(None, drkid.KitSpec.parse(kit.spec.model_dump(mode="json")))
-    assert again.spec.rounds == 3
+    assert again.spec.rounds == 20
     assert (again.decomposition.mesh.vertices == kit.decomposition.mesh.vertices).all()
 
 
 @pytest.mark.parametrize("name", GOOD)
 def test_every_good_shape_becomes_a_kit(name, shared_data, tmp_path):
-    kit = drkid.make_kit(shared_data / name, drkid.KitSpec(faces=172, rounds=2, **GOOD[name]))
+    kit = drkid.make_kit(shared_data / name, drkid.KitSpec(faces=172, rounds=20, **GOOD[name]))
     found = verify_kit(kit.write(tmp_path / "kit"))
     assert [check.name for check in found.checks if not check.passed] == []
     assert kit.metrics.error_max_percent <= 5

@@ -22,9 +22,9 @@ UNIT_ERROR, RANK_ERROR = 100.0, 1000.0  # what the largest error of a mesh that 
 LOCAL_SHARE, FARTHEST_SHARE = 0.85, 0.35  # of the hops; of the local ones at the place of the largest distance
 LOCAL_VERTICES = (7.0, 40.0)  # of a local hop
 HEAT = 0.08  # first temperature of a walk, in units of the score
-TRIALS = 12  # of a fold's repair, in one step of a walk
+TRIALS = 6  # of a fold's repair, in one step of a walk
 REPAIRED_FACES = 200  # from here on hops hardly ever end exactly: what they lead to is repaired
-REPAIR_STEPS = 4  # of a walk, after which such a repair is given up
+REPAIR_STEPS = 8  # of a walk, after which such a repair is given up
 
 
 @dataclass(frozen=True, eq=False)

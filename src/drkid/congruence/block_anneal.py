@@ -114,26 +114,6 @@ def sparse_round(
     return anneal_by_patches(frame, target, palette, weight=weight, freedom=held, rng=rng, blocks=how)
 
 
-def sparse_start(
-    frame: Framework,
-    target: Target,
-    palette: Palette,
-    freedom: Freedom,
-    rng: np.random.Generator,
-    blocks: Blocks = START_BLOCKS,
-    workers: int = 1,
-) -> Framework:
-    """From first labels to a soft framework: all rounds in their order.
-
-    Raises:
-        numpy.linalg.LinAlgError: the mesh has become degenerate.
-    """
-    how = replace(blocks, workers=workers)
-    for number in range(ROUNDS):
-        frame = sparse_round(frame, number, target, palette, freedom, rng, how)
-    return frame
-
-
 def sparse_hop(
     frame: Framework,
     target: Target,

@@ -28,18 +28,51 @@ class TriangleTree(NamedTuple):
     face: Ints
 
 
+@njit(cache=True, _nrt=False)
+def _select(values: Floats, order: Ints, first: int, last: int, middle: int) -> None:
+    """Sort `order` between `first` and `last` so far that `middle` parts smaller values from larger (Hoare 1961)."""
+    while last - first > 1:
+        pivot = values[order[(first + last) // 2]]
+        i, j = first, last - 1
+        while i <= j:
+            while values[order[i]] < pivot:
+                i += 1
+            while values[order[j]] > pivot:
+                j -= 1
+            if i <= j:
+                order[i], order[j] = order[j], order[i]
+                i += 1
+                j -= 1
+        if middle <= j:
+            last = j + 1
+        elif middle >= i:
+            first = i
+        else:
+            break
+
+
+@njit(cache=True, nogil=True)
+def _halved(centroids: Floats, order: Ints, depth: int) -> None:
+    """Sort `order` into the slots of leaves, halving every group at the median along its longest axis."""
+    for level in range(depth):
+        size = len(order) >> level
+        for first in range(0, len(order), size):
+            axis, longest = 0, -1.0
+            for r in range(3):
+                low, high = np.inf, -np.inf
+                for slot in order[first : first + size]:
+                    low, high = min(low, centroids[r, slot]), max(high, centroids[r, slot])
+                if high - low > longest:
+                    axis, longest = r, high - low
+            _select(centroids[axis], order, first, first + size, first + size // 2)
+
+
 def triangle_tree(mesh: TriMesh) -> TriangleTree:
     """The tree of a mesh's triangles; one is enough."""
     depth = max(int(np.log2(max(len(mesh.faces) / LEAF, 1))), 0)
     leaves = 2**depth
     order = np.resize(np.arange(len(mesh.faces)), -(-len(mesh.faces) // leaves) * leaves)
-    centroids = mesh.corners.mean(axis=1)
-    for level in range(depth):
-        groups = order.reshape(2**level, -1)
-        points = centroids[groups]
-        axis = np.ptp(points, axis=1).argmax(axis=1)
-        along = np.take_along_axis(points, axis[:, None, None], axis=2)[:, :, 0]
-        order = np.take_along_axis(groups, along.argsort(axis=1, kind="stable"), axis=1).ravel()
+    _halved(np.ascontiguousarray(mesh.corners.mean(axis=1).T), order, depth)
     corners = np.ascontiguousarray(mesh.corners[order])
     low, high = np.zeros((2 * leaves, 3)), np.zeros((2 * leaves, 3))
     boxes = corners.reshape(leaves, -1, 3)

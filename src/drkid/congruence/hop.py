@@ -1,7 +1,8 @@
 """Starts and hops: anneal softly, then solve exactly (basin hopping, Wales and Doye 1997).
 
-A start anneals labels and flips at falling weights of the shape. A hop softens an exact mesh, anneals it gently and
-solves it again; what comes out is another exact mesh nearby, or none.
+A start anneals labels and flips at falling weights of the shape, briefly: many short starts, of which the best are
+repaired and hop on, lead sooner to exact meshes than few thorough ones. A hop softens an exact mesh, anneals it gently
+and solves it again; what comes out is another exact mesh nearby, or none.
 """
 
 from dataclasses import dataclass
@@ -17,9 +18,9 @@ from drkid.congruence.quadratic_model import connectivity, quadratic_model
 from drkid.congruence.target import Target
 from drkid.mesh import Ints
 
-START_WEIGHTS = (1.0, 0.6, 0.4, 0.25)
-START_DAMPING, START_HEAT, START_STEPS_PER_FACE = 0.05, 3.0, 1200
-EXACT_WEIGHTS, EXACT_ITERATIONS = (0.1, 0.03, 0.01), 6
+START_WEIGHTS, START_ITERATIONS = (0.6, 0.25, 0.15), 2
+START_DAMPING, START_HEAT, START_STEPS_PER_FACE = 0.05, 0.5, 150
+EXACT_WEIGHTS, EXACT_ITERATIONS = (0.03,), 4
 HOP_EXACT_WEIGHT, SOFT_ITERATIONS, HOP_ITERATIONS = 0.03, 3, 4
 FLIP_SHARE = 0.3
 REHEATS, REHEAT = 6, 1.7  # where an anneal ends as it began: so often again, so much hotter each time
@@ -93,12 +94,11 @@ def annealed(
 
 
 def start(frame: Framework, problem: Problem, rng: np.random.Generator) -> Framework:
-    """From first labels to a soft framework: annealed twice at each weight, the ratio of lengths held."""
+    """From first labels to a soft framework: annealed at each weight, the ratio of lengths held."""
     held: Freedom = "none" if problem.freedom == "none" else "scale"
     for weight in START_WEIGHTS:
-        for _ in range(2):
-            how = Anneal(weight, START_DAMPING, START_HEAT, START_STEPS_PER_FACE * len(frame.mesh.faces))
-            frame, _ = solve(annealed(frame, problem, how, rng), problem.target, weight, held, 4)
+        how = Anneal(weight, START_DAMPING, START_HEAT, START_STEPS_PER_FACE * len(frame.mesh.faces))
+        frame, _ = solve(annealed(frame, problem, how, rng), problem.target, weight, held, START_ITERATIONS)
     return frame
 
 

@@ -1,9 +1,9 @@
 """The palette solver: few edge lengths, labelled, annealed and solved until every edge has its length exactly.
 
-Works in units of M_s's mean edge. First a few starts; from the best of them walks set out, which repair folds and hop
-until a mesh is exact, then hop, and now and then gather at the best mesh so far. Large meshes are not made exact: they
-are annealed patch by patch, and no face is off by more than a tolerance. What a round does depends on the seed and its
-number alone, so that the same rounds make the same kit anywhere; the clock only decides how many there are.
+Works in units of M_s's mean edge. First some short starts; from the best of them walks set out, which repair folds and
+hop until a mesh is exact, then hop, and now and then gather at the best mesh so far. Large meshes are not made exact:
+they are annealed patch by patch, and no face is off by more than a tolerance. What a round does depends on the seed and
+its number alone, so that the same rounds make the same kit anywhere; the clock only decides how many there are.
 """
 
 import os
@@ -27,9 +27,8 @@ from drkid.congruence.block_anneal import (
     sparse_exactly,
     sparse_hop,
     sparse_round,
-    sparse_start,
 )
-from drkid.congruence.fold import Descent, descended, descent_from
+from drkid.congruence.fold import Descent, descended
 from drkid.congruence.framework import Framework
 from drkid.congruence.given_palette import palette_of
 from drkid.congruence.hop import Problem, exactly, start
@@ -45,9 +44,8 @@ from drkid.mesh import TriMesh, read_only
 from drkid.spec import DEFAULT_FACES, MOST_WALKED_FACES, KitSpec
 
 START_RATIOS = (1.17, 1.15, 1.19)  # of two lengths, tried in turn
-MOST_DENSE_FACES = 300  # beyond, starts are annealed by patches
-STARTS, WALKS = 6, 4
-BLOCK_STARTS = 2  # beyond MOST_DENSE_FACES, each with a walk
+FIRST_STARTS, STARTS, WALKS = 2, 8, 4  # the first starts give an answer at once, the others are the first round
+MANY_FACES, FEW_WALKS = 300, 2  # repairs take long there, and two finish sooner than four
 ROUNDS_PER_GATHERING = 15  # of the walks at the best mesh so far; until then they grow colder
 UNDER_TOLERANCE = 0.9  # what is aimed at, of the tolerance asked for
 LEAST_SECONDS, MOST_SECONDS = 10.0, 60.0  # for small meshes, and for those of 500 faces
@@ -113,30 +111,28 @@ class PaletteSolver:
         target = Target(self.surface.scaled(1 / scale))
         problem = Problem(target, palette, free if mesh.genus == 0 else "none", mesh.genus == 0)
         yardstick = Yardstick(unit, self.spec)
-        dense = len(mesh.faces) <= MOST_DENSE_FACES
+        with threadpool_limits(1):
+            walks = self._begun(range(1 if large else FIRST_STARTS), problem, yardstick)
+        state = PaletteState(scale, problem, yardstick, walks[0].found, walks, 0, began, ())
+        return replace(state, history=(_recorded(state),))
+
+    def _begun(self, numbers: range, problem: Problem, yardstick: Yardstick) -> tuple[Walk, ...]:
+        """Starts of these numbers, the best first, each with a repair where that is to follow."""
+        unit = yardstick.reference
 
         def begin(number: int) -> Walk:
             rng = np.random.default_rng([self.spec.seed, 0, number])
-            first = first_frame(unit, palette, number, rng)
-            if large:
+            first = first_frame(unit, problem.palette, number, rng)
+            if _is_large(unit):
                 return Walk(judged(first, yardstick))
-            if dense:
-                soft = start(first, problem, rng)
-                found = judged(exactly(soft, problem), yardstick)
-            else:
-                soft = sparse_start(first, target, palette, problem.freedom, rng)
-                found = judged(sparse_exactly(soft, target, problem.freedom, square=problem.square), yardstick)
-            repairs = descends(problem) and (not dense or number % 2 == 0)
-            return Walk(found, descent_from(soft, problem.freedom) if repairs else None)
+            soft = start(first, problem, rng)
+            found = judged(exactly(soft, problem), yardstick)
+            return Walk(found, Descent(soft, found.frame) if descends(problem) else None)
 
-        with threadpool_limits(1):
-            count = 1 if large else STARTS if dense else BLOCK_STARTS
-            walks = sorted(_in_parallel([lambda n=n: begin(n) for n in range(count)]), key=_rank_of_walk)[:WALKS]
-        state = PaletteState(scale, problem, yardstick, walks[0].found, tuple(walks), 0, began, ())
-        return replace(state, history=(_recorded(state),))
+        return tuple(sorted(_in_parallel([lambda n=n: begin(n) for n in numbers]), key=_rank_of_walk))
 
     def step(self, state: PaletteState) -> PaletteState:
-        """One round: a step of each walk, or a weight or a hop of a large mesh."""
+        """One round: the other starts or a step of each walk, or a weight or a hop of a large mesh."""
         began = time.monotonic()
         with threadpool_limits(1):
             after = self._large_step(state) if _is_large(state.found.frame.mesh) else self._walked(state)
@@ -144,6 +140,11 @@ class PaletteSolver:
         return replace(after, history=(_recorded(after),))
 
     def _walked(self, state: PaletteState) -> PaletteState:
+        if state.round == 0:
+            more = self._begun(range(FIRST_STARTS, STARTS), state.problem, state.yardstick)
+            count = FEW_WALKS if len(state.found.frame.mesh.faces) > MANY_FACES else WALKS
+            walks = tuple(sorted((*state.walks, *more), key=_rank_of_walk)[:count])
+            return replace(state, found=walks[0].found, walks=walks)
         phase = state.round % ROUNDS_PER_GATHERING
         gathers = state.found.exact and phase == 0
         walks = tuple(Walk(state.found) for _ in state.walks) if gathers else state.walks
