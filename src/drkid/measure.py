@@ -110,7 +110,7 @@ def smooth_normals(mesh: TriMesh) -> Floats:
     """(V, 3): unit vertex normals, averaged with their neighbours a few times."""
     normals, (a, b) = mesh.vertex_normals, mesh.edges.T
     rows, columns = np.concatenate([a, b]), np.concatenate([b, a])
-    adjacency = csr_array((np.ones(len(rows)), (rows, columns)), shape=(len(normals),) * 2)
+    adjacency = csr_array((np.ones(len(rows)), (rows, columns)), shape=(len(normals), len(normals)))
     for _ in range(NORMAL_SMOOTHING):
         total = normals + adjacency @ normals
         normals = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), np.finfo(float).tiny)
