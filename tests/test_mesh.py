@@ -105,3 +105,15 @@ def test_flipped_looks_inwards_and_submesh_keeps_only_what_it_uses(potato):
     assert len(few.faces) == 2
     assert len(few.vertices) <= 6
     assert few.corners == pytest.approx(potato.corners[[3, 5]])
+
+
+def test_a_moved_mesh_keeps_what_is_known_of_its_topology_and_nothing_else():
+    before = TETRAHEDRON.flipped().flipped()
+    known = before.edge_faces, before.valence, before.genus, before.mean_edge, before.volume
+    after = before.moved(2.0 * before.vertices)
+    assert after.edge_faces is known[0]
+    assert after.valence is known[1]
+    assert (after.genus, after.mean_edge, after.volume) == pytest.approx((known[2], 2 * known[3], 8 * known[4]))
+    fresh = TriMesh(after.vertices, after.faces)
+    assert (fresh.edges == after.edges).all()
+    assert (fresh.face_edges == after.face_edges).all()

@@ -6,13 +6,17 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 Scalar = TypeVar("Scalar", bound=np.generic)
+_TOPOLOGY = (
+    *("half_edges", "_edges_and_sides", "edge_faces", "valence", "open_edges", "misoriented_edges"),
+    *("pinched_vertices", "is_closed_manifold", "face_component", "euler_characteristic"),
+)
 
 
 def read_only(array: NDArray[Scalar]) -> NDArray[Scalar]:
@@ -72,9 +76,9 @@ class TriMesh:
     @cached_property
     def vertex_normals(self) -> Floats:
         """(V, 3): unit mean of the adjacent faces' unit normals (the paper, section Thickening)."""
-        total = np.zeros_like(self.vertices)
-        for corner in range(3):
-            np.add.at(total, self.faces[:, corner], self.face_normals)
+        corners = (self.faces.ravel(), np.repeat(np.arange(len(self.faces)), 3))
+        incidence = csr_array((np.ones(self.faces.size), corners), shape=(len(self.vertices), len(self.faces)))
+        total = np.zeros_like(self.vertices) + incidence @ self.face_normals
         length = np.linalg.norm(total, axis=1, keepdims=True)
         return read_only(np.divide(total, length, out=np.zeros_like(total), where=length > 0))
 
@@ -225,8 +229,11 @@ class TriMesh:
     # ---- new meshes
 
     def moved(self, vertices: ArrayLike) -> "TriMesh":
-        """The same faces with other vertex positions (V, 3)."""
-        return TriMesh(np.asarray(vertices, np.float64), self.faces)
+        """The same faces with other vertex positions (V, 3); what is known of their topology already is kept."""
+        mesh = TriMesh(np.asarray(vertices, np.float64), self.faces)
+        if len(mesh.vertices) == len(self.vertices):
+            vars(mesh).update({name: self.__dict__[name] for name in _TOPOLOGY if name in self.__dict__})
+        return mesh
 
     def scaled(self, factor: float) -> "TriMesh":
         """All coordinates times `factor`."""
