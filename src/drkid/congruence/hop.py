@@ -20,6 +20,7 @@ from drkid.mesh import Ints
 
 START_WEIGHTS, START_ITERATIONS = (0.6, 0.25, 0.15), 2
 START_DAMPING, START_HEAT, START_STEPS_PER_FACE = 0.05, 0.5, 150
+OF_ONE_WEIGHTS, OF_ONE_HEAT, OF_ONE_STEPS_PER_FACE = (1.0, 0.6, 0.4, 0.25), 3.0, 2400  # one class alone moves heavily
 EXACT_WEIGHTS, EXACT_ITERATIONS = (0.03,), 4
 HOP_EXACT_WEIGHT, SOFT_ITERATIONS, HOP_ITERATIONS = 0.03, 3, 4
 FLIP_SHARE = 0.3
@@ -96,8 +97,11 @@ def annealed(
 def start(frame: Framework, problem: Problem, rng: np.random.Generator) -> Framework:
     """From first labels to a soft framework: annealed at each weight, the ratio of lengths held."""
     held: Freedom = "none" if problem.freedom == "none" else "scale"
-    for weight in START_WEIGHTS:
-        how = Anneal(weight, START_DAMPING, START_HEAT, START_STEPS_PER_FACE * len(frame.mesh.faces))
+    weights, heat, steps = START_WEIGHTS, START_HEAT, START_STEPS_PER_FACE
+    if len(problem.palette.multisets) == 1:
+        weights, heat, steps = OF_ONE_WEIGHTS, OF_ONE_HEAT, OF_ONE_STEPS_PER_FACE
+    for weight in weights:
+        how = Anneal(weight, START_DAMPING, heat, steps * len(frame.mesh.faces))
         frame, _ = solve(annealed(frame, problem, how, rng), problem.target, weight, held, START_ITERATIONS)
     return frame
 
