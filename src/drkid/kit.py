@@ -485,12 +485,29 @@ class Building:
 
 
 @dataclass(frozen=True)
+class Overlapping:
+    """Pairs of pieces that reach into one another.
+
+    `pairs` at their places, by `largest_mm3` at most, which is `largest_percent` of the smaller piece, between `faces`;
+    `swung` more when one piece turns by `swing_degrees` about one of its hinges.
+    """
+
+    pairs: int
+    largest_mm3: float
+    largest_percent: float
+    faces: tuple[int, int] | None
+    swing_degrees: float
+    swung: int
+
+
+@dataclass(frozen=True)
 class AssemblyFigures:
     """Whether and how the kit goes together."""
 
     closure: Closure
     swing: Swing
     building: Building
+    overlap: Overlapping | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -566,6 +583,8 @@ class Metrics:
     groove_choices: tuple[GrooveChoice, ...] = ()
     curved: CurvedMetrics | None = None
     merged: MergedMetrics | None = None
+    cut_corners: int = 0
+    deepest_cut_mm: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
