@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from math import cos, radians, sin
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from drkid.errors import FitError
 from drkid.kit import Dimensions
 from drkid.mesh import Floats
 from drkid.parts.detent import groove
-from drkid.parts.pocket import depth_mm, flare_mm
+from drkid.parts.pocket import deepest_height_mm, depth_mm, flare_mm
 from drkid.parts.prismoid import Prismoid, cut_corners, side_insets
 
 SCALE_TOLERANCE = 1e-5  # relative: the size is rounded up to whole mm afterwards
@@ -68,10 +67,9 @@ def margins(triangle: Floats, prismoid: Prismoid, dimensions: Dimensions) -> Ite
 
 def _telling_heights(dimensions: Dimensions, low: float) -> tuple[float, ...]:
     """Between which pockets and bevels change linearly: inner face, foot of the grooves on either side, roof's ends."""
-    ridge, lean = groove(dimensions), radians(dimensions.key_bend_degrees / 2)
+    ridge = groove(dimensions)
     grooved = () if ridge is None else (ridge.z - ridge.half_base, ridge.z + ridge.half_base)
-    inner_end = dimensions.pocket_height_mm / 2 * cos(lean) - dimensions.pocket_depth_mm * sin(lean)
-    return (low, *grooved, *((max(low, inner_end),) if lean else ()), dimensions.pocket_height_mm / 2)
+    return (low, *grooved, deepest_height_mm(dimensions), dimensions.pocket_height_mm / 2)
 
 
 def corner_room_mm(triangle: Floats, prismoid: Prismoid, dimensions: Dimensions, face: int, corner: int) -> float:
