@@ -15,6 +15,8 @@ import shlex
 import subprocess
 import tempfile
 import time
+from concurrent.futures import ProcessPoolExecutor
+from itertools import product, repeat
 from pathlib import Path
 
 from congruence import SHAPES
@@ -65,6 +67,12 @@ def measured(shape: str, solver: str, process: str, checker: str | None, folder:
     return row
 
 
+def in_a_folder(kit: tuple[str, str, str], checker: str | None) -> dict:
+    """The same in a folder that is removed afterwards."""
+    with tempfile.TemporaryDirectory() as folder:
+        return measured(*kit, checker, Path(folder) / "kit")
+
+
 def line(row: dict) -> str:
     """One printed row."""
     head = f"{row['shape'].split('.')[0][:22]:<23}{row['solver']:<11}{row['process']:<10}"
@@ -86,6 +94,7 @@ def main() -> None:
     parser.add_argument("--solvers", type=lambda text: text.split(","), default=list(SOLVERS))
     parser.add_argument("--processes", type=lambda text: text.split(","), default=list(PROCESSES))
     parser.add_argument("--checker")
+    parser.add_argument("--jobs", type=int, default=1, help="kits at a time; with more than one seconds mean little")
     parser.add_argument("--out", type=Path, default=HERE / "results" / "fabrication.json")
     options = parser.parse_args()
     print(
@@ -93,13 +102,12 @@ def main() -> None:
         "parts asm docs"
     )
     rows = []
-    for shape in options.shapes:
-        for solver in options.solvers:
-            for process in options.processes:
-                with tempfile.TemporaryDirectory() as folder:
-                    rows.append(measured(shape, solver, process, options.checker, Path(folder) / "kit"))
-                print(line(rows[-1]), flush=True)
-                options.out.write_text(json.dumps(rows, indent=1) + "\n")
+    kits = list(product(options.shapes, options.solvers, options.processes))
+    with ProcessPoolExecutor(options.jobs) as pool:
+        for row in pool.map(in_a_folder, kits, repeat(options.checker)):
+            rows.append(row)
+            print(line(row), flush=True)
+            options.out.write_text(json.dumps(rows, indent=1) + "\n")
     passed = sum(not (r.get("refused") or r["failed"] or r.get("checker")) for r in rows)
     print(f"{passed} of {len(rows)} kits pass everything")
 

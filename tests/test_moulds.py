@@ -64,7 +64,7 @@ def test_the_note_tells_what_size_the_lengths_make(pair_kit):
     notes = size_notes(FEW, pair_kit.decomposition.mesh)
     assert set(notes) <= set(pair_kit.notes)
     assert f"40 pieces are {size:.1f} mm long" in notes[0]
-    assert "34 and 39.8 mm" in notes[0]
+    assert "35 and 41 mm" in notes[0]
     assert size_notes(KitSpec(), pair_kit.decomposition.mesh) == ()
 
 

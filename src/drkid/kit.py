@@ -338,7 +338,8 @@ class PartSet:
     `scale_mm_per_unit` takes the decomposition's unit to mm. Face f is made from `parts[face_part[f]]`, whose
     corner 0 lies at the face's corner `face_turn[f]`. `groove_mm` (E,) is each joint's widest visible gap;
     `groove_choices` is what bevels made for this shape alone, and further variants of them, would make of it.
-    `coupon` is a fit test as it lies on the bed, None where there is no connector.
+    `coupon` is a fit test as it lies on the bed, None where there is no connector. `cut_corners` of the shapes are cut
+    off, by up to `deepest_cut_mm`, because pieces of one vertex would meet there.
     """
 
     scale_mm_per_unit: float
@@ -353,6 +354,8 @@ class PartSet:
     groove_choices: tuple[GrooveChoice, ...] = ()
     coupon: Solid | None = None
     merged: tuple[MergedPiece, ...] = ()  # class_index is then the part's number; empty where each face is a piece
+    cut_corners: int = 0
+    deepest_cut_mm: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -482,12 +485,29 @@ class Building:
 
 
 @dataclass(frozen=True)
+class Overlapping:
+    """Pairs of pieces that reach into one another.
+
+    `pairs` at their places, by `largest_mm3` at most, which is `largest_percent` of the smaller piece, between `faces`;
+    `swung` more when one piece turns by `swing_degrees` about one of its hinges.
+    """
+
+    pairs: int
+    largest_mm3: float
+    largest_percent: float
+    faces: tuple[int, int] | None
+    swing_degrees: float
+    swung: int
+
+
+@dataclass(frozen=True)
 class AssemblyFigures:
     """Whether and how the kit goes together."""
 
     closure: Closure
     swing: Swing
     building: Building
+    overlap: Overlapping | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -563,6 +583,8 @@ class Metrics:
     groove_choices: tuple[GrooveChoice, ...] = ()
     curved: CurvedMetrics | None = None
     merged: MergedMetrics | None = None
+    cut_corners: int = 0
+    deepest_cut_mm: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -66,6 +66,8 @@ def measure_kit(
         groove_choices=part_set.groove_choices,
         curved=_curved(surface, patches, part_set.scale_mm_per_unit),
         merged=_merged(patches, part_set, triangle_classes),
+        cut_corners=part_set.cut_corners,
+        deepest_cut_mm=part_set.deepest_cut_mm,
     )
 
 

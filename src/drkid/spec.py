@@ -44,10 +44,10 @@ PRESSURE_CLASSES = 7  # of the same print
 MOST_WALKED_FACES = 800  # up to here exactness is sought, beyond it a tolerance is kept
 EXACT_TOLERANCE, LARGE_TOLERANCE, PRESSURE_TOLERANCE = 0.1, 1.0, 1.5  # in percent of the mean edge
 
-UNIVERSAL = (34.0, 39.8)
+UNIVERSAL = (35.0, 41.0)
 """Two edge lengths in mm of which every organic shape can be built: ratio 1.17, room for every process's connectors."""
 
-UNIVERSAL_BEVEL = (100.0, 114.0)
+UNIVERSAL_BEVEL = (100.0, 117.0)
 """Concave and convex bends in degrees that pieces of given lengths are bevelled for: they then fit any shape."""
 
 FOLLOWING = ("bisector", "flippable")  # thickenings whose bevels follow the bends of the surface

@@ -149,11 +149,12 @@ def _assembly(found: "AssemblyFigures | None") -> str:
     """The verdict, the figures that bear it out, and how the last piece goes in."""
     if found is None:
         return "not tried"
-    closure, building = found.closure, found.building
+    closure, building, overlap = found.closure, found.building, found.overlap
+    apart = "" if overlap is None else f"{overlap.pairs or 'no'} pairs of pieces overlap; "
     last = "the last piece goes in" if building.last_goes_in else "no piece goes in last"
     return (
         f"{closure.verdict}: gaps up to {closure.gaps.max_mm:.2g} of {closure.play_mm:.2g} mm, "
-        f"drift {closure.drift.max_percent:.2g} % of the box; {last}"
+        f"drift {closure.drift.max_percent:.2g} % of the box; {apart}{last}"
     )
 
 

@@ -12,7 +12,7 @@ from drkid.export import KitDocument
 from drkid.export.layout import ASSEMBLED, BOM_CSV, BOM_JSON, PIECE_CLASS, SIMPLIFIED, SURFACE
 from drkid.export.read_back import broken_file, read_document, read_mesh
 from drkid.intersection import self_intersections
-from drkid.kit import Building, Closure, Swing
+from drkid.kit import Building, Closure, Overlapping, Swing
 from drkid.measure import bend_radians, dihedral
 from drkid.mesh import Floats, Ints, TriMesh
 from drkid.metrics import surface_distances
@@ -287,6 +287,7 @@ def _together(folder: Path, mesh: TriMesh, kit: KitDocument) -> list[Check]:
         _closes(closure, kit),
         *_closure(closure, kit),
         _swings(swing, kit),
+        _overlaps(structure.overlapping(float(kit.spec["swing_degrees"])), kit),
         _builds(structure.building(order, last), kit),
     ]
 
@@ -329,6 +330,19 @@ def _swings(swing: Swing, kit: KitDocument) -> Check:
         and abs(stated.swing.outward_degrees - swing.outward_degrees) < SWING_DEGREES
     )
     return Check("swing of the joints", right, told)
+
+
+def _overlaps(overlap: Overlapping, kit: KitDocument) -> Check:
+    """As stated; unstated, no two pieces may overlap at their places."""
+    told = (
+        f"{overlap.pairs} pairs of pieces overlap, by {overlap.largest_mm3:.2g} mm³ at most, {overlap.swung} more when "
+        f"one turns by {overlap.swing_degrees:g}° about a hinge"
+    )
+    stated = kit.metrics.assembly.overlap if kit.metrics.assembly else None
+    if stated is None:
+        return Check("overlaps", not overlap.pairs, told)
+    same = stated.pairs == overlap.pairs and stated.swung == overlap.swung
+    return Check("overlaps", same and _near(stated.largest_mm3, overlap.largest_mm3), told)
 
 
 def _builds(building: Building, kit: KitDocument) -> Check:

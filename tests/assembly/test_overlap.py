@@ -38,6 +38,25 @@ def test_bisected_pieces_do_not_overlap(connector) -> None:
     assert overlaps(assembly.pieces, parts.parts) == ()
 
 
+def test_the_figures_of_an_assembly_count_pairs_at_rest_and_within_the_swing() -> None:
+    parts = make_parts(decomposed(geodesic()), KitSpec(connector="none"))
+    mesh = geodesic().scaled(parts.scale_mm_per_unit)
+    free, wide = (assemble(mesh, parts, spec=KitSpec(swing_degrees=s)).figures.overlap for s in (5.5, 25.5))
+    assert free is not None
+    assert (free.pairs, free.swung, free.swing_degrees, free.faces) == (0, 0, 5.0, None)
+    assert wide is not None
+    assert (wide.pairs, wide.swing_degrees) == (0, 25.0)
+    assert wide.swung >= len(mesh.edges)  # every hinge's own pair, and others
+
+
+def test_the_figures_name_the_worst_pair() -> None:
+    assembly, parts = built(potato(2), 6, thickening="perpendicular", connector="none")
+    found, figures = overlaps(assembly.pieces, parts.parts), assembly.figures.overlap
+    assert figures is not None
+    assert (figures.pairs, figures.faces, figures.largest_mm3) == (len(found), found[0].faces, found[0].volume_mm3)
+    assert any(f"{len(found)} pairs of pieces reach into one another" in note for note in assembly.notes)
+
+
 def test_overlaps_are_the_kernel_s_for_every_pair() -> None:
     assembly, parts = built(potato(2), 6, thickening="perpendicular", connector="none")
     solids = [parts.parts[piece.part].solid.moved(piece.transform) for piece in assembly.pieces]

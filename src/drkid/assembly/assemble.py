@@ -15,6 +15,7 @@ from drkid.kit import (
     Closure,
     Dimensions,
     Joint,
+    Overlapping,
     PartSet,
     Piece,
     Swing,
@@ -100,6 +101,8 @@ def _proven(
     progress("joining pieces by their hinges", 0.2)
     closure = structure.joining().closure
     swing = structure.swinging(spec.swing_degrees)
+    progress("looking for overlaps", 0.4)
+    overlap = structure.overlapping(spec.swing_degrees)
     progress("choosing the last piece", 0.6)
     last = structure.insertion(dimensions.thickness_mm, structure.by_convexity())
     progress("ordering pieces", 0.8)
@@ -110,8 +113,13 @@ def _proven(
         pieces,
         joints,
         steps(structure.graph, order, structure.faces),
-        AssemblyFigures(closure, swing, building),
-        (*_closure_notes(closure), *_swing_notes(swing), *_building_notes(building, structure.faces[last.piece])),
+        AssemblyFigures(closure, swing, building, overlap),
+        (
+            *_closure_notes(closure),
+            *_swing_notes(swing),
+            *_overlap_notes(overlap),
+            *_building_notes(building, structure.faces[last.piece]),
+        ),
     )
 
 
@@ -141,6 +149,19 @@ def _swing_notes(swing: Swing) -> Iterator[str]:
         yield (
             f"{swing.blocked} joints cannot turn by {swing.wanted_degrees:g}° both ways; the tightest has "
             f"{min(swing.inward_degrees, swing.outward_degrees):.1f}°."
+        )
+
+
+def _overlap_notes(overlap: Overlapping) -> Iterator[str]:
+    if overlap.faces is not None:
+        a, b = overlap.faces
+        yield (
+            f"{overlap.pairs} pairs of pieces reach into one another, most of all those of faces {a} and {b}, by "
+            f"{overlap.largest_mm3:.2g} mm³ ({overlap.largest_percent:.2g} % of the smaller)."
+        )
+    if overlap.swung:
+        yield (
+            f"{overlap.swung} pairs of pieces meet when one of them turns by {overlap.swing_degrees:g}° about a hinge."
         )
 
 

@@ -1,10 +1,13 @@
 """Overlap: where placed pieces reach into one another."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from drkid.kit import Part, Piece
+from drkid.assembly.hinge_framework import HingeFramework
+from drkid.assembly.piece_graph import PieceGraph
+from drkid.kit import Overlapping, Part, Piece
 from drkid.mesh import Floats, Ints, read_only
 from drkid.solid import Solid
 
@@ -21,24 +24,99 @@ class Overlap:
 
 
 def overlaps(pieces: tuple[Piece, ...], parts: tuple[Part, ...]) -> tuple[Overlap, ...]:
-    """Every pair of placed pieces that overlap, the largest share first.
+    """Every pair of placed pieces that overlap, the largest share first."""
+    bodies = Bodies([part.solid for part in parts])
+    placed = Placements(
+        [piece.part for piece in pieces], [piece.face for piece in pieces], np.stack([p.transform for p in pieces])
+    )
+    return bodies.overlaps(placed)
 
-    Looked at are all pairs whose boxes meet, which those with a common vertex do. Most are settled by the planes of
-    their convex hulls: where all corners of one lie beyond a face of the other nothing is shared. The others are
-    intersected exactly, hulls first.
+
+@dataclass(frozen=True, eq=False)
+class Placements:
+    """Pieces by the number of their part, a face of M_f each, and their motions (P, 4, 4)."""
+
+    parts: Sequence[int]
+    faces: Sequence[int]
+    motions: Floats
+
+
+class Bodies:
+    """The parts' solids with their convex hulls, which settle most questions.
+
+    Where all corners of one hull lie beyond a face of the other nothing is shared. Other pairs are intersected exactly,
+    hulls first.
     """
-    bodies = [_Body.of(part.solid) for part in parts]
-    placed = [bodies[piece.part].corners @ piece.transform[:3, :3].T + piece.transform[:3, 3] for piece in pieces]
-    found: list[Overlap] = []
-    for a, b in meeting_boxes(np.array([[x.min(axis=0), x.max(axis=0)] for x in placed])).tolist():
-        one, other = bodies[pieces[a].part], bodies[pieces[b].part]
-        if _apart(one, pieces[a], placed[b]) or _apart(other, pieces[b], placed[a]):
-            continue
-        volume = _shared_mm3(one, pieces[a].transform, other, pieces[b].transform)
-        if volume > NOTHING_MM3:
-            smaller = min(one.solid.volume, other.solid.volume)
-            found.append(Overlap((pieces[a].face, pieces[b].face), volume, volume / smaller))
-    return tuple(sorted(found, key=lambda one: (-one.share, one.faces)))
+
+    def __init__(self, solids: Sequence[Solid]) -> None:
+        """Of parts as they lie in their frames."""
+        self.bodies = [_Body.of(solid) for solid in solids]
+
+    def overlaps(self, placed: Placements) -> tuple[Overlap, ...]:
+        """Every pair that overlaps, the largest share first; looked at are all pairs whose boxes meet."""
+        found: list[Overlap] = []
+        corners = [self._corners(part, motion) for part, motion in zip(placed.parts, placed.motions, strict=True)]
+        for a, b in meeting_boxes(np.array([[x.min(axis=0), x.max(axis=0)] for x in corners])).tolist():
+            one, other = placed.parts[a], placed.parts[b]
+            volume = self.shared_mm3((one, placed.motions[a]), (other, placed.motions[b]))
+            if volume > NOTHING_MM3:
+                smaller = min(self.bodies[one].solid.volume, self.bodies[other].solid.volume)
+                found.append(Overlap((placed.faces[a], placed.faces[b]), volume, volume / smaller))
+        return tuple(sorted(found, key=lambda one: (-one.share, one.faces)))
+
+    def shared_mm3(self, one: tuple[int, Floats], other: tuple[int, Floats]) -> float:
+        """The volume that two parts share at their places (4, 4); 0 where that is rounding."""
+        (a, at_a), (b, at_b) = one, other
+        first, second = self.bodies[a], self.bodies[b]
+        if _apart(first, at_a, self._corners(b, at_b)) or _apart(second, at_b, self._corners(a, at_a)):
+            return 0.0
+        return _shared_mm3(first, at_a, second, at_b)
+
+    def _corners(self, part: int, motion: Floats) -> Floats:
+        return self.bodies[part].corners @ motion[:3, :3].T + motion[:3, 3]
+
+
+def overlapping(
+    bodies: Bodies, placed: Placements, framework: HingeFramework, graph: PieceGraph, swing: float
+) -> Overlapping:
+    """Pairs that overlap at their places, and those that do so only when one piece turns about one of its hinges.
+
+    `swing` is in degrees, both ways. A piece that turns is held against the one at its hinge and against those that it
+    meets in an end of the hinge alone: its other neighbours it leaves, and they are not there yet.
+    """
+    rest = bodies.overlaps(placed)
+    number = {face: piece for piece, face in enumerate(placed.faces)}
+    met = {frozenset(number[face] for face in one.faces) for one in rest}
+    swung: set[frozenset[int]] = set()
+    for pair, sides, frames in zip(graph.pieces.tolist(), graph.sides.tolist(), framework.frames, strict=True):
+        for piece, side, frame, partner in zip(pair, sides, frames, reversed(pair), strict=True):
+            others = {partner} | graph.touching(piece, side)
+            left = {other for other in others if frozenset((piece, other)) not in met | swung}
+            for turn in (-swing, swing):
+                motion = placed.motions[piece] @ _turned(frame, turn)
+                for other in sorted(left):
+                    if (
+                        bodies.shared_mm3((placed.parts[piece], motion), (placed.parts[other], placed.motions[other]))
+                        > NOTHING_MM3
+                    ):
+                        swung.add(frozenset((piece, other)))
+    worst = rest[0] if rest else None
+    return Overlapping(
+        pairs=len(rest),
+        largest_mm3=worst.volume_mm3 if worst else 0.0,
+        largest_percent=100 * worst.share if worst else 0.0,
+        faces=worst.faces if worst else None,
+        swing_degrees=swing,
+        swung=len(swung),
+    )
+
+
+def _turned(frame: Floats, degrees: float) -> Floats:
+    """(4, 4): the turn about the x axis of a connector frame (4, 4), in the part's coordinates."""
+    cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    turn = np.eye(4)
+    turn[1:3, 1:3] = [[cosine, -sine], [sine, cosine]]
+    return frame @ turn @ np.linalg.inv(frame)
 
 
 def meeting_boxes(boxes: Floats) -> Ints:
@@ -76,9 +154,9 @@ class _Body:
         return cls(solid, hull, mesh.vertices, np.unique(np.round(planes, 9), axis=0))
 
 
-def _apart(body: _Body, piece: Piece, points: Floats) -> bool:
-    """Whether a plane of a placed piece's hull has all `points` (n, 3) on its outer side."""
-    local = (points - piece.transform[:3, 3]) @ piece.transform[:3, :3]
+def _apart(body: _Body, motion: Floats, points: Floats) -> bool:
+    """Whether a plane of a placed part's hull has all `points` (n, 3) on its outer side."""
+    local = (points - motion[:3, 3]) @ motion[:3, :3]
     return bool(((local @ body.planes[:, :3].T).min(axis=0) >= body.planes[:, 3] - 1e-9).any())
 
 

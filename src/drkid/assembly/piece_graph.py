@@ -29,6 +29,21 @@ class PieceGraph:
             found[a][i], found[b][k] = b, a
         return tuple(map(tuple, found))
 
+    @cached_property
+    def around(self) -> dict[int, tuple[int, ...]]:
+        """The pieces at each vertex."""
+        found: dict[int, list[int]] = {}
+        for piece, outline in enumerate(self.outlines):
+            for vertex in outline:
+                found.setdefault(vertex, []).append(piece)
+        return {vertex: tuple(pieces) for vertex, pieces in found.items()}
+
+    def touching(self, piece: int, side: int) -> set[int]:
+        """The pieces that share an end of a piece's side with it, and no side."""
+        outline = self.outlines[piece]
+        ends = (outline[side], outline[(side + 1) % len(outline)])
+        return {other for end in ends for other in self.around[end]} - {piece, *self.neighbours[piece]}
+
 
 def piece_graph(outlines: Iterable[Sequence[int]], edges: Iterable[Sequence[int]]) -> PieceGraph:
     """The graph of pieces with these outlines, one joint for each edge, in the order of `edges`.

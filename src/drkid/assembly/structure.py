@@ -10,12 +10,14 @@ from drkid.assembly.closure import Joining, Play, joined
 from drkid.assembly.hinge_framework import HingeFramework, hinge_framework
 from drkid.assembly.insertion import Insertion, Placed, last_piece
 from drkid.assembly.order import border_lengths, breadth_first, order, stretches
+from drkid.assembly.overlap import Bodies, Placements, overlapping
 from drkid.assembly.piece_graph import PieceGraph
 from drkid.assembly.swing import sectors, swing
-from drkid.kit import Building, ConnectorKind, Swing
+from drkid.kit import Building, ConnectorKind, Overlapping, Swing
 from drkid.mesh import Floats
 from drkid.solid import Solid
 
+TOUCHING_DEGREES = 0.5  # less than the swing that bevels leave room for: there they touch
 SAME_BEND = 1e-6  # radians: bends that differ by less are equal, so that rounding does not choose
 
 
@@ -76,6 +78,16 @@ class Structure:
             for shape in self.shapes
         ]
         return swing(self.framework, self.parts, self.graph.sides, reach, wanted_degrees)[0]
+
+    def overlapping(self, swing_degrees: float) -> Overlapping:
+        """Which pieces reach into one another, at their places and within a little less than the swing."""
+        return overlapping(
+            Bodies([shape.solid for shape in self.shapes]),
+            Placements(self.parts, self.faces, self.placements),
+            self.framework,
+            self.graph,
+            max(swing_degrees - TOUCHING_DEGREES, 0.0),
+        )
 
     def by_convexity(self) -> tuple[int, ...]:
         """The pieces, that one first whose least convex joint is the most convex: neighbours do not lean over it."""

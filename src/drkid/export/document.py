@@ -225,12 +225,24 @@ class BuildingDocument(Model):
     last_candidates: int = Field(ge=1, description="pieces that were tried as the last")
 
 
+class OverlapDocument(Model):
+    """Pairs of pieces that reach into one another."""
+
+    pairs: int = Field(ge=0, description="at their places")
+    largest_mm3: float = Field(ge=0)
+    largest_percent: float = Field(ge=0, description="of the smaller piece")
+    faces: tuple[int, int] | None = Field(description="of the pair with the largest share")
+    swing_degrees: float
+    swung: int = Field(ge=0, description="more pairs, when one piece turns by swing_degrees about one of its hinges")
+
+
 class AssemblyDocument(Model):
     """Whether and how the kit goes together."""
 
     closure: ClosureDocument
     swing: SwingDocument
     building: BuildingDocument
+    overlap: OverlapDocument | None = None
 
 
 class CurvedDocument(Model):
@@ -288,6 +300,8 @@ class MetricsDocument(Model):
     unique_connector_parts: int | None = Field(default=None, ge=0, description="printed shapes of connectors")
     curved: CurvedDocument | None = None
     merged: MergedDocument | None = None
+    cut_corners: int = Field(default=0, ge=0, description="cut off where pieces of one vertex would meet")
+    deepest_cut_mm: float = Field(default=0.0, ge=0, description="farthest of these cuts behind its corner")
 
 
 class FindingDocument(Model):

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from math import cos, radians, sin
 
 import numpy as np
 
@@ -11,11 +10,12 @@ from drkid.errors import FitError
 from drkid.kit import Dimensions
 from drkid.mesh import Floats
 from drkid.parts.detent import groove
-from drkid.parts.pocket import depth_mm, flare_mm
-from drkid.parts.prismoid import Prismoid, side_insets
+from drkid.parts.pocket import deepest_height_mm, depth_mm, flare_mm
+from drkid.parts.prismoid import Prismoid, cut_corners, side_insets
 
 SCALE_TOLERANCE = 1e-5  # relative: the size is rounded up to whole mm afterwards
 SCALE_STEP = 1.5
+CUT_HALVINGS = 12
 MOST_STEPS = 60
 LEAST_MM = 1e-3  # a pocket that a bevel cuts off altogether counts as one so deep; so does a groove
 FITS_MM = -1e-6  # slack that still counts as fitting: a size that was computed fits again when it is given
@@ -49,6 +49,8 @@ def margins(triangle: Floats, prismoid: Prismoid, dimensions: Dimensions) -> Ite
     if dimensions.connector == "none":
         return
     wall = dimensions.min_wall_mm
+    if prismoid.cuts is not None:
+        yield Margin("wall between pocket and cut corner", wall, _behind_cuts(triangle, prismoid, dimensions))
     bevels = list(prismoid.bevels(triangle))
     levels = prismoid.levels_mm[prismoid.levels_mm < dimensions.pocket_height_mm / 2].tolist()
     for height in sorted({*levels, *_telling_heights(dimensions, low)}):
@@ -65,10 +67,44 @@ def margins(triangle: Floats, prismoid: Prismoid, dimensions: Dimensions) -> Ite
 
 def _telling_heights(dimensions: Dimensions, low: float) -> tuple[float, ...]:
     """Between which pockets and bevels change linearly: inner face, foot of the grooves on either side, roof's ends."""
-    ridge, lean = groove(dimensions), radians(dimensions.key_bend_degrees / 2)
+    ridge = groove(dimensions)
     grooved = () if ridge is None else (ridge.z - ridge.half_base, ridge.z + ridge.half_base)
-    inner_end = dimensions.pocket_height_mm / 2 * cos(lean) - dimensions.pocket_depth_mm * sin(lean)
-    return (low, *grooved, *((max(low, inner_end),) if lean else ()), dimensions.pocket_height_mm / 2)
+    return (low, *grooved, deepest_height_mm(dimensions), dimensions.pocket_height_mm / 2)
+
+
+def corner_room_mm(triangle: Floats, prismoid: Prismoid, dimensions: Dimensions, face: int, corner: int) -> float:
+    """How far behind a corner of the inner (0) or the outer face (1) a cut may lie.
+
+    It leaves a wall in front of the pockets, and half of the face's inscribed circle.
+    """
+    low, high = 0.0, max(inradius(triangle, prismoid.faces[face]) / 2, 0.0)
+    if dimensions.connector == "none":
+        return high
+    for _ in range(CUT_HALVINGS):
+        cuts = np.zeros((2, 3))
+        cuts[face, corner] = middle = (low + high) / 2
+        wall = _behind_cuts(triangle, prismoid.truncated(cuts), dimensions)
+        low, high = (middle, high) if wall >= dimensions.min_wall_mm else (low, middle)
+    return low
+
+
+def _behind_cuts(triangle: Floats, prismoid: Prismoid, dimensions: Dimensions) -> float:
+    """Least distance from the pockets to the planes in which corners are cut, on whose side of mid-height they lie."""
+    cuts, middle, nearest = prismoid.cuts, prismoid.outline(0.0), np.inf
+    if cuts is None:
+        return nearest
+    for face, (outline, end) in enumerate(zip(prismoid.faces, prismoid.heights_mm, strict=True)):
+        roof = min(dimensions.pocket_height_mm / 2, end) if face else 0.0
+        heights = sorted({0.0, roof} if face else {0.0, *(z for z in _telling_heights(dimensions, end) if z < 0)})
+        for corner in np.flatnonzero(cuts[face]).tolist():
+            a, b = cut_corners(outline, cuts[face])[corner]
+            normal = np.cross([*(b - a), 0.0], [*(middle[corner] - a), -end])
+            normal *= (np.sign(normal[:2] @ (outline.mean(axis=0) - a))) / np.linalg.norm(normal)
+            for height in heights:
+                points = pocket_outlines(triangle, prismoid.outline(height), dimensions, height).reshape(-1, 2)
+                distance = (points - a) @ normal[:2] + (height - end) * normal[2]
+                nearest = min(nearest, float(distance.min()))
+    return nearest
 
 
 def inradius(triangle: Floats, outline: Floats) -> float:

@@ -17,7 +17,7 @@ from drkid.parts.bevel_variants import Moulds, moulds
 from drkid.parts.coupon import coupon
 from drkid.parts.curved_piece import curved_solid, needed_thickness_mm, raised
 from drkid.parts.dimensions import THICKNESS_STEP_MM, proposals
-from drkid.parts.fit import FITS_MM, Margin, margins, smallest_scale
+from drkid.parts.fit import FITS_MM, Margin, corner_room_mm, margins, smallest_scale
 from drkid.parts.groove import groove_mm
 from drkid.parts.groove_choices import groove_choices, recesses_of
 from drkid.parts.hinge import hinge_half
@@ -25,14 +25,15 @@ from drkid.parts.key import box_key
 from drkid.parts.make_merged import merged_parts
 from drkid.parts.marks import marked
 from drkid.parts.members import Members
-from drkid.parts.notes import groove_notes, notes
+from drkid.parts.notes import corner_notes, groove_notes, notes
 from drkid.parts.pocket import pocket, side_frames
 from drkid.parts.prismoid import Prismoid
 from drkid.parts.process_findings import findings
 from drkid.parts.snap import snap_half
 from drkid.parts.thickening import thickened
+from drkid.parts.truncation import Truncated, truncated
 from drkid.progress import Progress, silent
-from drkid.spec import KitSpec
+from drkid.spec import FOLLOWING, KitSpec
 
 MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 FIRST_GUESS_THICKNESSES = 4.0  # mean edge of the pieces with which the search for a size begins
@@ -71,7 +72,8 @@ def make_parts(
     design, scale = _scaled(design)
     require_bends(decomposition.mesh.scaled(scale), spec)
     progress("cutting parts", 0.5)
-    shapes = design.pieces(scale)
+    corners = _truncated(design, scale) if patches is None else Truncated(design.pieces(scale))
+    shapes = corners.shapes
     recess = recesses_of(found, shapes, scale)
     width = groove_mm(decomposition.mesh, members, recess)
     choices = () if curved else groove_choices(decomposition, design.dimensions, spec, scale)
@@ -84,12 +86,18 @@ def make_parts(
         face_part=face_part,
         face_turn=members.turn,
         groove_mm=read_only(width),
-        notes=(*notes(found, design.dimensions, spec, recess, scale), *groove_notes(width, choices, spec)),
+        notes=(
+            *notes(found, design.dimensions, spec, recess, scale),
+            *groove_notes(width, choices, spec),
+            *corner_notes(corners),
+        ),
         findings=findings(
             design.triangles(scale), shapes, np.unique(members.face_class).tolist(), found, design.dimensions, spec
         ),
         groove_choices=choices,
         coupon=coupon(design.dimensions, spec),
+        cut_corners=corners.corners,
+        deepest_cut_mm=corners.deepest_mm,
     )
     if patches is not None and patches.merged:
         part_set = merged_parts(patches, part_set, spec)
@@ -265,6 +273,20 @@ def _required_scale(design: _Design, scale: float) -> float:
         remedy=f"lengths {factor:.2f} times as long (--palette {longer}), a thinner rod (--rod-diameter-mm), "
         "a finer --process, or --connector none",
     )
+
+
+def _truncated(design: _Design, scale: float) -> Truncated:
+    """The pieces, their corners cut as M_f's vertices ask; those with bevels for every shape are the same for all."""
+    shapes, triangles, spec = design.pieces(scale), design.triangles(scale), design.spec
+    if spec.thickening not in FOLLOWING or spec.bevel_degrees is not None:
+        return Truncated(shapes)
+    mesh = design.decomposition.mesh.scaled(scale)
+
+    def room_mm(own: int, face: int, corner: int) -> float:
+        both = (0, 1) if spec.thickening == "flippable" else (face,)
+        return min(corner_room_mm(triangles[own], shapes[own], design.dimensions, one, corner) for one in both)
+
+    return truncated(shapes, triangles, design.members, mesh, spec, room_mm)
 
 
 def _parts(design: _Design, shapes: tuple[Prismoid, ...], scale: float) -> tuple[tuple[Part, ...], Ints]:

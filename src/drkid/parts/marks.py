@@ -12,6 +12,7 @@ from drkid.class_triangle import SAME_LENGTH
 from drkid.kit import Dimensions, Part
 from drkid.mesh import Floats, Ints
 from drkid.parts.detent import groove
+from drkid.parts.pocket import deepest_height_mm
 from drkid.parts.stroke_font import strokes
 from drkid.solid import Solid
 
@@ -108,8 +109,9 @@ def _ground(part: Part, d: Dimensions, width_mm: float, depth_mm: float) -> _Gro
     if ridge is not None:  # a groove lies deeper than the mark, and stands out farther than the pocket's wall
         below = ridge.z - ridge.half_base + d.thickness_mm / 2 - depth_mm
         needed = max(needed, ridge.height + sqrt(max(needed**2 - below**2, 0.0)))
-    heights = (-d.thickness_mm / 2 + SKIN_MM, -d.thickness_mm / 2 + max(depth_mm, 2 * SKIN_MM))
-    sections = [_segments(part.solid.cross_section(z)) for z in heights]
+    face = -d.thickness_mm / 2
+    heights = {face + SKIN_MM, face + max(depth_mm, 2 * SKIN_MM), max(face + SKIN_MM, deepest_height_mm(d))}
+    sections = [_segments(part.solid.cross_section(z)) for z in sorted(heights)]
     low, high = sections[0].min(axis=(0, 1)), sections[0].max(axis=(0, 1))
     ground = _Ground(low, np.zeros(np.ceil((high - low) / STEP_MM).astype(int) + 1))
     room = np.min([_inside_distance(ground.nodes, s) for s in sections], axis=0) - (needed + width_mm / 2 + SKIN_MM)

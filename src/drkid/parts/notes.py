@@ -10,6 +10,7 @@ from drkid.parts.bevel import SHARPEST_JOINT_DEGREES, demanded
 from drkid.parts.bevel_variants import Moulds
 from drkid.parts.groove import touching_mm
 from drkid.parts.members import Members
+from drkid.parts.truncation import Truncated
 from drkid.spec import FOLLOWING, KitSpec
 
 TOUCH_MM = 1e-3  # pieces that reach into one another by less are drawn apart by any process
@@ -80,6 +81,21 @@ def groove_notes(groove_mm: Floats, choices: tuple[GrooveChoice, ...], spec: Kit
         f"Grooves are {own.mean_mm:.1f} mm wide in the mean and {own.max_mm:.1f} mm at most with {own.moulds} "
         f"{'mould' if own.moulds == 1 else 'moulds'}; {steps}.",
     )
+
+
+def corner_notes(corners: Truncated) -> Iterator[str]:
+    """Which corners were cut, and where that was not enough."""
+    if corners.corners:
+        yield (
+            f"{corners.corners} corners of the pieces are cut off, by up to {corners.deepest_mm:.1f} mm: around a "
+            "vertex pieces that are no neighbours would meet there."
+        )
+    if corners.vertices:
+        named = ", ".join(map(str, corners.vertices[:3])) + (", …" if len(corners.vertices) > 3 else "")
+        yield (
+            f"Around {len(corners.vertices)} vertices ({named}) pieces that are no neighbours come nearer than hinges "
+            "swing, or meet: no more of their corners can be cut off. More --faces or another --seed helps."
+        )
 
 
 def _short_notes(

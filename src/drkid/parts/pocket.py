@@ -46,6 +46,13 @@ def depth_mm(dimensions: Dimensions, height_mm: float) -> float:
     return min(floor, (d.pocket_height_mm / 2 - height_mm * cos(lean)) / sin(lean)) if lean else floor
 
 
+def deepest_height_mm(dimensions: Dimensions) -> float:
+    """The height at which a pocket reaches farthest into a piece: at the inner face, or where a key's roof ends."""
+    d, lean = dimensions, radians(dimensions.key_bend_degrees / 2)
+    end = d.pocket_height_mm / 2 * cos(lean) - d.pocket_depth_mm * sin(lean)
+    return max(-d.thickness_mm / 2, end) if lean else -d.thickness_mm / 2
+
+
 def side_frames(triangle: Floats, lean_degrees: float = 0.0) -> Floats:
     """(3, 4, 4): connector to part coordinates at each side of a triangle (3, 2) in the plane z = 0.
 

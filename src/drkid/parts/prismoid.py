@@ -1,7 +1,7 @@
 """Prismoid: a triangle with thickness, its sides bevelled."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -15,11 +15,13 @@ from drkid.solid import Solid
 class Prismoid:
     """The convex hull of `outlines` (n, 3, 2), spaced evenly from −thickness_mm/2 to +thickness_mm/2.
 
-    Two outlines make plane bevels, three make bevels with a ridge along the middle plane.
+    Two outlines make plane bevels, three make bevels with a ridge along the middle plane. Where `cuts` (2, 3) are
+    given the corners of the inner and the outer face are cut off, so far behind them along the bisectors.
     """
 
     outlines: Floats
     thickness_mm: float
+    cuts: Floats | None = None
 
     @property
     def faces(self) -> Floats:
@@ -39,8 +41,21 @@ class Prismoid:
     @property
     def solid(self) -> Solid:
         """The piece without pockets."""
-        points = [np.column_stack([f, np.full(3, z)]) for f, z in zip(self.outlines, self.levels_mm, strict=True)]
-        return Solid.hull(np.vstack(points))
+        return Solid.hull(self.points)
+
+    @property
+    def points(self) -> Floats:
+        """(6n, 3): its corners, two for each corner of an outline, which are one where nothing is cut."""
+        flat = np.repeat(self.outlines, 2, axis=1)
+        if self.cuts is not None:
+            flat[[0, -1]] = [
+                cut_corners(face, row).reshape(6, 2) for face, row in zip(self.faces, self.cuts, strict=True)
+            ]
+        return np.vstack([np.column_stack([f, np.full(6, z)]) for f, z in zip(flat, self.levels_mm, strict=True)])
+
+    def truncated(self, cuts_mm: Floats) -> "Prismoid":
+        """With its corners cut off, `cuts_mm` (2, 3) behind them."""
+        return replace(self, cuts=read_only(np.array(cuts_mm)))
 
     def outline(self, height_mm: float) -> Floats:
         """(3, 2): corners of the section at a height (a twisted side bulges over it, never stays behind)."""
@@ -61,6 +76,15 @@ class Prismoid:
         insets = [side_insets(triangle, outline) for outline in self.outlines]
         for (low, below), (high, above) in pairwise(zip(self.levels_mm.tolist(), insets, strict=True)):
             yield low, high, (below - above) / (high - low)
+
+
+def cut_corners(outline: Floats, depths_mm: Floats) -> Floats:
+    """(3, 2, 2): both ends of the cuts that lie `depths_mm` (3,) behind the corners of an outline (3, 2)."""
+    ways = np.stack([np.roll(outline, 1, axis=0), np.roll(outline, -1, axis=0)], axis=1) - outline[:, None]
+    ways /= np.linalg.norm(ways, axis=2, keepdims=True)
+    bisector = ways.sum(axis=1, keepdims=True)
+    along = (ways * bisector / np.linalg.norm(bisector, axis=2, keepdims=True)).sum(axis=2, keepdims=True)
+    return outline[:, None] + depths_mm[:, None, None] * ways / along
 
 
 def side_insets(triangle: Floats, outline: Floats) -> Floats:
