@@ -7,8 +7,6 @@ and Wang, "Grid generation and optimization based on centroidal Voronoi tessella
 """
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
 
 import igl
 import numpy as np
@@ -18,6 +16,7 @@ from scipy.sparse.linalg import cg
 
 from drkid.measure import bend_radians
 from drkid.mesh import Floats, TriMesh
+from drkid.remesh.closest_point import ClosestPoint, barycentric
 
 SMOOTHING_EDGES = 0.5  # edges over which curvature is averaged: what is smaller than an edge no edge can follow
 CONTRAST = 4.0  # curvature counts as at least 1/4 and at most 4 times its mean: edges as at most 1 to 4
@@ -30,23 +29,15 @@ PRECISION = 1e-10  # of the averaged tensors: rounding then does not show in the
 class SizingField:
     """`length` (V,): how long an edge is to be at each vertex of a surface; between them it is linear."""
 
-    surface: TriMesh
+    closest: ClosestPoint
     length: Floats
 
     def __call__(self, points: Floats) -> Floats:
         """(P,): the length wanted at the point of the surface that is closest to each of `points` (P, 3)."""
-        _, face, there = self._tree.squared_distance(
-            self.surface.vertices, self.surface.faces, np.ascontiguousarray(points)
-        )
-        a, b, c = (np.ascontiguousarray(corner) for corner in np.moveaxis(self.surface.corners[face], 1, 0))
-        weights = np.asarray(igl.barycentric_coordinates(np.ascontiguousarray(there), a, b, c))
-        return np.einsum("ij,ij->i", np.clip(weights, 0, 1), self.length[self.surface.faces[face]])
-
-    @cached_property
-    def _tree(self) -> Any:
-        tree = igl.AABB()
-        tree.init(self.surface.vertices, self.surface.faces)
-        return tree
+        surface = self.closest.surface
+        there, face = self.closest.located(points)
+        weights = barycentric(surface.corners[face], there)
+        return np.einsum("ij,ij->i", weights, self.length[surface.faces[face]]) / weights.sum(axis=1)
 
     def density(self, points: Floats) -> Floats:
         """(P,): of the tessellation whose cells have the wanted size, length^(−4) in two dimensions."""
@@ -79,7 +70,7 @@ def sizing_field(surface: TriMesh, count: int, adapt: float) -> SizingField:
     wanted = np.clip(bend / mean, 1 / CONTRAST, CONTRAST) ** (-adapt / 2)
     for _ in range(BALANCES):
         wanted = _limited(surface, wanted * (even * np.sqrt((mass / wanted**2).sum() / mass.sum())))
-    return SizingField(surface, wanted)
+    return SizingField(ClosestPoint(surface), wanted)
 
 
 def curvature(surface: TriMesh, radius: float) -> Floats:

@@ -13,7 +13,7 @@ from numba import njit
 
 from drkid.measure import project, sample
 from drkid.mesh import Floats, Ints, TriMesh
-from drkid.remesh.closest_point import ClosestPoint
+from drkid.remesh.closest_point import ClosestPoint, barycentric
 from drkid.remesh.sizing_field import SizingField, goals
 from drkid.remesh.tangential_relaxation import moved_where_harmless
 
@@ -210,14 +210,3 @@ def _signed(here: Floats, there: Floats, normals: Floats, rounding: float) -> tu
     sign = np.where(np.einsum("ij,ij->i", apart, normals) < 0, -1.0, 1.0)
     direction = apart * (sign / np.maximum(size, rounding))[:, None]
     return size * sign, np.where((size > rounding)[:, None], direction, normals)
-
-
-def barycentric(corners: Floats, points: Floats) -> Floats:
-    """(P, 3): barycentric coordinates of points in triangles (Ericson, Real-Time Collision Detection, 3.4)."""
-    a, b, c = np.moveaxis(corners, 1, 0)
-    u, v, w = b - a, c - a, points - a
-    uu, uv, vv = (np.einsum("ij,ij->i", p, q) for p, q in ((u, u), (u, v), (v, v)))
-    wu, wv = (np.einsum("ij,ij->i", w, q) for q in (u, v))
-    area = np.maximum(uu * vv - uv * uv, np.finfo(float).tiny)
-    s, t = (vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area
-    return np.clip(np.column_stack([1 - s - t, s, t]), 0, 1)
