@@ -37,7 +37,7 @@ def test_the_thin_bar_is_cut_and_the_wide_ring_stays():
     np.testing.assert_allclose(closing.centre[1:], (0.4, 0.0), atol=0.1)
     assert abs(closing.centre[0]) < 1.4
     assert closing.around == pytest.approx(2 * np.pi * 0.25, rel=0.3)
-    assert unmoved(mesh, found) > 1 - 1.2 * MOST_REMOVED
+    assert unmoved(mesh, found) > 1 - 1.5 * MOST_REMOVED
     assert found.volume < mesh.volume
     far = np.abs(found.vertices[:, 1] - 0.4) > 0.4
     assert set(map(bytes, found.vertices[far])) <= set(map(bytes, mesh.vertices))

@@ -146,7 +146,7 @@ def _best(closest: ClosestPoint, seeds: Floats, count: int, spec: KitSpec, sizin
         for mesh in (polished(evened, fit, np.random.default_rng([spec.seed, GLIDING])), evened, draft.mesh):
             flaws = _flaws(mesh)
             if best is None or flaws < best[0]:
-                best = flaws, Simplified(mesh, (), draft.notes + _unevenness(mesh, sizing))
+                best = flaws, Simplified(mesh, (), draft.notes + _unevenness(mesh, sizing, spec))
             if flaws == (0, 0):
                 return best[1]
     if best is None:
@@ -201,13 +201,15 @@ def _evened(mesh: TriMesh, closest: ClosestPoint, rounds: int, sizing: SizingFie
     return mesh
 
 
-def _unevenness(mesh: TriMesh, sizing: SizingField | None) -> tuple[str, ...]:
+def _unevenness(mesh: TriMesh, sizing: SizingField | None, spec: KitSpec) -> tuple[str, ...]:
     spread = edge_spread(mesh)
     if sizing is not None:
-        shortest, longest = (mesh.edge_lengths.min() / mesh.mean_edge, mesh.edge_lengths.max() / mesh.mean_edge)
+        shortest, longest = mesh.edge_lengths.min() / mesh.mean_edge, mesh.edge_lengths.max() / mesh.mean_edge
+        lost = "; the palette solver makes them two or three lengths again, --method pressure keeps more of it"
         return (
-            f"edges are unequal on purpose (--adapt), shorter where the surface bends more: "
-            f"{shortest:.2f} to {longest:.2f} of the mean, standard deviation {100 * spread:.0f} %",
+            f"edges of the simplified mesh are unequal on purpose (--adapt {spec.adapt:g}), shorter where the surface "
+            f"bends more: {shortest:.2f} to {longest:.2f} of the mean, standard deviation {100 * spread:.0f} %"
+            f"{lost if spec.method == 'palette' else ''}",
         )
     if spread <= UNEVEN:
         return ()
