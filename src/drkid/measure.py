@@ -31,12 +31,12 @@ def _closest(mesh: TriMesh, points: Floats) -> tuple[Floats, Ints, Floats]:
     return np.asarray(squared, np.float64), np.asarray(face, np.int64), np.asarray(closest, np.float64)
 
 
-def sample(mesh: TriMesh, count: int, rng: np.random.Generator) -> Floats:
-    """(count, 3): points spread uniformly by area, stratified so that large faces get their exact share.
+def sample(mesh: TriMesh, count: int, rng: np.random.Generator, weight: Floats | None = None) -> Floats:
+    """(count, 3): points spread by area, times `weight` (F,) if given, stratified: large faces get their exact share.
 
     Turk, "Generating random points in triangles", Graphics Gems (1990), for the point within a face.
     """
-    share = np.concatenate([[0.0], np.cumsum(mesh.areas)])
+    share = np.concatenate([[0.0], np.cumsum(mesh.areas if weight is None else weight * mesh.areas)])
     along = (np.arange(count) + rng.random(count)) * (share[-1] / count)
     face = np.minimum(np.searchsorted(share, along, side="right") - 1, len(mesh.faces) - 1)
     u, v = np.sqrt(rng.random((count, 1))), rng.random((count, 1))

@@ -171,8 +171,7 @@ class KitSpec(BaseModel):
     max_genus: int | None = _field(
         None,
         "Input",
-        "Most handles that a volume's surface may have: the smallest beyond are closed and told; all are "
-        "kept when not given.",
+        "Most handles that the surface may have: the smallest beyond are closed and told; all are kept when not given.",
         ge=0,
     )
 
@@ -182,6 +181,14 @@ class KitSpec(BaseModel):
     vertices: int | None = _field(None, "Mesh", "Number of vertices of the simplified mesh, in place of --faces.", ge=4)
     lloyd_iterations: int = _field(5, "Mesh", "Lloyd iterations of the Voronoi remeshing.", ge=0, le=1000)
     newton_iterations: int = _field(30, "Mesh", "Quasi-Newton (L-BFGS) iterations that follow.", ge=0, le=10000)
+    adapt: float = _field(
+        0.0,
+        "Mesh",
+        "How much shorter edges are where the surface bends more: 0 all alike, which a kit of few shapes wants; 1 "
+        "each as long as the same distance from the surface allows.",
+        ge=0,
+        le=1,
+    )
 
     classes: int = _field(2, "Congruence", "Number k of classes of identical pieces; 7 with --method pressure.", ge=1)
     method: Method = _field(

@@ -5,12 +5,12 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from drkid.measure import edge_spread, hausdorff
-from drkid.remesh.closest_point import ClosestPoint
+from drkid.remesh.closest_point import ClosestPoint, barycentric
 from drkid.remesh.dislocation_glide import glide
 from drkid.remesh.edge_collapse import collapse_to
 from drkid.remesh.offset_surface import offset_surface
 from drkid.remesh.polish import polished
-from drkid.remesh.surface_fit import barycentric, surface_fit
+from drkid.remesh.surface_fit import surface_fit
 
 
 @pytest.fixture(scope="module")

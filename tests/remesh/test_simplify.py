@@ -4,32 +4,18 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from remeshed import check, surface_of
 from scipy.ndimage import gaussian_filter
 from scipy.spatial.transform import Rotation
 from skimage.measure import marching_cubes
 
 from drkid.errors import RemeshError, SpecError
 from drkid.intersection import self_intersections
-from drkid.kit import Source, Surface
-from drkid.measure import distance_to_surface, edge_spread, hausdorff
+from drkid.measure import edge_spread, hausdorff
 from drkid.mesh import TriMesh
 from drkid.remesh import simplify
 from drkid.remesh.simplify import fewest_vertices
 from drkid.spec import KitSpec
-
-
-def surface_of(mesh):
-    return Surface(mesh, Source("made", ""))
-
-
-def check(mesh, source, count):
-    assert len(mesh.vertices) == count
-    assert mesh.is_closed_manifold
-    assert mesh.component_count == 1
-    assert mesh.genus == source.genus
-    assert mesh.volume > 0
-    assert distance_to_surface(source, mesh.vertices).max() < 0.5 * mesh.mean_edge
-    assert len(self_intersections(mesh)) == 0
 
 
 @pytest.mark.parametrize("faces", [116, 172, 496])

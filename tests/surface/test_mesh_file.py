@@ -1,10 +1,12 @@
 """M_i of a mesh file: formats, welding, bodies, and what is refused."""
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
+from handled_shapes import barred_torus
 
 from drkid.errors import InputError, SpecError
 from drkid.mesh import TriMesh
@@ -157,8 +159,15 @@ def test_bad_meshes_from_the_wild_are_refused(name, words, shared_data):
     assert words in refusal(shared_data / "bad" / name)
 
 
-def test_handles_of_a_mesh_are_not_closed_and_that_is_said(ring, tmp_path):
-    trimesh.Trimesh(ring.vertices, ring.faces, process=False).export(tmp_path / "ring.ply")
-    with pytest.raises(InputError, match=r"cannot be closed.*genus 0 at most.*found: genus 1.*--max-genus 1"):
-        extract_surface(tmp_path / "ring.ply", KitSpec(max_genus=0))
-    assert extract_surface(tmp_path / "ring.ply", KitSpec(max_genus=1)).mesh.genus == 1
+def test_handles_of_a_mesh_are_kept_or_closed_and_that_is_said(tmp_path):
+    mesh = barred_torus(size=28)
+    trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(tmp_path / "barred.ply")
+    kept, closed = (extract_surface(tmp_path / "barred.ply", KitSpec(max_genus=most, unit="nm")) for most in (None, 1))
+    assert (kept.mesh.genus, closed.mesh.genus) == (2, 1)
+    assert kept.notes == ("the surface has 2 handles; where they are noise, --max-genus closes the smallest ones",)
+    (note,) = closed.notes
+    told = r"a handle closed \(--max-genus\): a bridge cut at \((\S+), (\S+), (\S+)\) nm, (\S+) nm around"
+    found = re.fullmatch(told, note)
+    assert found is not None
+    assert float(found[2]) == pytest.approx(0.4, abs=0.1)
+    assert float(found[4]) == pytest.approx(2 * np.pi * 0.25, rel=0.35)

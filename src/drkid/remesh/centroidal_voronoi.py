@@ -22,18 +22,20 @@ from drkid.mesh import Floats, Ints, TriMesh
 NEIGHBOURS = 24  # of a seed, by which cells are clipped at first; doubled where the security radius asks for more
 CORNERS = 64  # most corners of a clipped triangle: three and one more for each bisector that cuts it
 MEMORY = 7  # corrections that L-BFGS keeps; the usual choice
+Scalar = Any  # a number out of an array of them, which numpy's stubs take for an array
 
 
 @dataclass(frozen=True, eq=False)
 class Tessellation:
     """The restricted Voronoi diagram of seeds on a surface.
 
-    `area` (N,) of the cells, `moment` (N, 3) the integral of the position over each cell, `energy` (N,) the integral of
-    the squared distance to its seed, `triangles` (T, 3) the dual triangles: one for each corner where three cells meet,
-    counter-clockwise seen from outside, `first` (F,) the seed nearest to the middle of each of the surface's triangles.
+    `mass` (N,) the integral of the density over each cell, its area where that is 1; `moment` (N, 3) and `energy` (N,)
+    those of density times position, and times the squared distance to its seed. `triangles` (T, 3) are the dual ones:
+    one for each corner where three cells meet, counter-clockwise seen from outside. `first` (F,) is the seed nearest to
+    the middle of each of the surface's triangles.
     """
 
-    area: Floats
+    mass: Floats
     moment: Floats
     energy: Floats
     triangles: Ints
@@ -132,8 +134,8 @@ def _add_corner(triangles: Ints, found: int, i: int, j: int, k: int) -> int:
 
 
 @njit(cache=True)
-def _integrate(polygons: Floats, here: int, count: int, sites: Floats, i: int, cells: Floats) -> None:
-    # Adds area, energy and moment to cells[i]. Exact for the fan of triangles: the second moment of one about the seed
+def _integrate(polygons: Floats, here: int, count: int, sites: Floats, i: int, density: Scalar, cells: Floats) -> None:
+    # Adds mass, energy and moment to cells[i]. Exact for the fan of triangles: the second moment of one about the seed
     # is A (Σ |p|² + |Σ p|²) / 12.
     p, q, r = sites[i, 0], sites[i, 1], sites[i, 2]
     ax, ay, az = polygons[here, 0, 0] - p, polygons[here, 0, 1] - q, polygons[here, 0, 2] - r
@@ -143,14 +145,14 @@ def _integrate(polygons: Floats, here: int, count: int, sites: Floats, i: int, c
         x = (by - ay) * (cz - az) - (bz - az) * (cy - ay)
         y = (bz - az) * (cx - ax) - (bx - ax) * (cz - az)
         z = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        area = np.sqrt(x * x + y * y + z * z) / 2
+        mass = density * (np.sqrt(x * x + y * y + z * z) / 2)
         sx, sy, sz = ax + bx + cx, ay + by + cy, az + bz + cz
         squares = ax * ax + ay * ay + az * az + bx * bx + by * by + bz * bz + cx * cx + cy * cy + cz * cz
-        cells[i, 0] += area
-        cells[i, 1] += area * (squares + sx * sx + sy * sy + sz * sz) / 12
-        cells[i, 2] += area * (p + sx / 3)
-        cells[i, 3] += area * (q + sy / 3)
-        cells[i, 4] += area * (r + sz / 3)
+        cells[i, 0] += mass
+        cells[i, 1] += mass * (squares + sx * sx + sy * sy + sz * sz) / 12
+        cells[i, 2] += mass * (p + sx / 3)
+        cells[i, 3] += mass * (q + sy / 3)
+        cells[i, 4] += mass * (r + sz / 3)
 
 
 @njit(cache=True)
@@ -189,11 +191,11 @@ def _nearest(middles: Floats, sites: Floats, near: Ints, apart: Floats, first: I
 
 @njit(cache=True)
 def _restricted_voronoi(
-    corners: Floats, first: Ints, sites: Floats, near: Ints, apart: Floats
+    corners: Floats, density: Floats, first: Ints, sites: Floats, near: Ints, apart: Floats
 ) -> tuple[Floats, Ints, bool]:
-    # `first` (F,) the seed nearest to each triangle's middle; `near` (N, K) the other seeds in order of distance and
-    # `apart` their squared distances. Area, energy and moment (N, 5) of each cell; the dual triangles; and False where
-    # K seeds were too few to be sure of a cell.
+    # `density` (F,) of each triangle, `first` (F,) the seed nearest to its middle; `near` (N, K) the other seeds in
+    # order of distance, `apart` their squared distances. Mass, energy and moment (N, 5) of each cell; the dual
+    # triangles; and False where K seeds were too few to be sure of a cell.
     n = len(sites)
     cells, triangles, found = np.zeros((n, 5)), np.empty((16 * n + 16, 3), np.int64), 0
     queued, queue = np.full(n, -1, np.int64), np.empty(n, np.int64)
@@ -212,7 +214,7 @@ def _restricted_voronoi(
             count, here = _clip(i, sites, near, apart, polygons, sides, left)
             if count < 0:
                 return cells, triangles[:0], False
-            _integrate(polygons, here, count, sites, i, cells)
+            _integrate(polygons, here, count, sites, i, density[f], cells)
             for c in range(count):
                 j, k = sides[here, c], sides[here, c + 1 if c + 1 < count else 0]
                 if j >= 0 and queued[j] != f:
@@ -233,9 +235,12 @@ def is_compiled() -> bool:
     return any(index.stat().st_mtime >= source for index in kept)
 
 
-def tessellate(surface: TriMesh, seeds: Floats, guess: Ints | None = None) -> Tessellation:
+def tessellate(
+    surface: TriMesh, seeds: Floats, guess: Ints | None = None, density: Floats | None = None
+) -> Tessellation:
     """The restricted Voronoi diagram of `seeds` (N, 3), N ≥ 2, all different, on the surface or near it.
 
+    `density` (F,) is that of each of the surface's triangles, 1 where None; it weighs integrals and moves no border.
     `guess` (F,), if given, is `first` of a diagram of nearly the same seeds: it saves time and changes nothing else.
 
     Raises:
@@ -243,6 +248,7 @@ def tessellate(surface: TriMesh, seeds: Floats, guess: Ints | None = None) -> Te
     """
     tree = cKDTree(seeds)
     middles = surface.corners.mean(axis=1)
+    density = np.ones(len(surface.faces)) if density is None else density
     first = None if guess is None else guess.copy()
     others = min(NEIGHBOURS, len(seeds) - 1)
     while True:
@@ -250,7 +256,7 @@ def tessellate(surface: TriMesh, seeds: Floats, guess: Ints | None = None) -> Te
         near, apart = np.ascontiguousarray(near[:, 1:], np.int64), np.ascontiguousarray(apart[:, 1:] ** 2)
         if first is None or not _nearest(middles, seeds, near, apart, first):
             first = np.asarray(tree.query(middles)[1], np.int64)
-        cells, triangles, sure = _restricted_voronoi(surface.corners, first, seeds, near, apart)
+        cells, triangles, sure = _restricted_voronoi(surface.corners, density, first, seeds, near, apart)
         if sure:
             return Tessellation(cells[:, 0], cells[:, 2:], cells[:, 1], triangles, first)
         if others == len(seeds) - 1:
@@ -263,7 +269,9 @@ def tessellate(surface: TriMesh, seeds: Floats, guess: Ints | None = None) -> Te
         others = min(2 * others, len(seeds) - 1)
 
 
-def lloyd(surface: TriMesh, seeds: Floats, iterations: int) -> tuple[Floats, list[float]]:
+def lloyd(
+    surface: TriMesh, seeds: Floats, iterations: int, density: Floats | None = None
+) -> tuple[Floats, list[float]]:
     """Each seed to the centroid of its cell, `iterations` times; the seeds and the energy before each step.
 
     The energy never rises (Du, Faber and Gunzburger 1999, section 5.2). A seed without a cell stays where it is.
@@ -271,26 +279,26 @@ def lloyd(surface: TriMesh, seeds: Floats, iterations: int) -> tuple[Floats, lis
     history: list[float] = []
     guess: Ints | None = None
     for _ in range(iterations):
-        cells = tessellate(surface, seeds, guess)
+        cells = tessellate(surface, seeds, guess, density)
         guess = cells.first
         history.append(float(cells.energy.sum()))
-        full = cells.area > 0
+        full = cells.mass > 0
         seeds = seeds.copy()
-        seeds[full] = cells.moment[full] / cells.area[full, None]
+        seeds[full] = cells.moment[full] / cells.mass[full, None]
     return seeds, history
 
 
-def energy_and_gradient(surface: TriMesh, seeds: Floats) -> tuple[float, Floats]:
-    """E = Σ ∫ |x − sᵢ|² over the cells, and dE/dsᵢ = 2 mᵢ (sᵢ − cᵢ), (N, 3) (Liu et al. 2009, equation 3)."""
-    return _energy_and_gradient(tessellate(surface, seeds), seeds)
+def energy_and_gradient(surface: TriMesh, seeds: Floats, density: Floats | None = None) -> tuple[float, Floats]:
+    """E = Σ ∫ ρ |x − sᵢ|² over the cells, and dE/dsᵢ = 2 mᵢ (sᵢ − cᵢ), (N, 3) (Liu et al. 2009, equation 3)."""
+    return _energy_and_gradient(tessellate(surface, seeds, None, density), seeds)
 
 
 def _energy_and_gradient(cells: Tessellation, seeds: Floats) -> tuple[float, Floats]:
-    return float(cells.energy.sum()), 2 * (cells.area[:, None] * seeds - cells.moment)
+    return float(cells.energy.sum()), 2 * (cells.mass[:, None] * seeds - cells.moment)
 
 
 def quasi_newton(
-    surface: TriMesh, seeds: Floats, iterations: int, told: Callable[[int], None]
+    surface: TriMesh, seeds: Floats, iterations: int, told: Callable[[int], None], density: Floats | None = None
 ) -> tuple[Floats, list[float]]:
     """Lower the energy by L-BFGS (Liu et al. 2009, section 4); the seeds, and the energies, the first one too.
 
@@ -298,7 +306,7 @@ def quasi_newton(
     the first iteration is not free of units.
     """
     middle, length = seeds.mean(axis=0), np.sqrt(surface.areas.sum() / len(seeds))
-    cells = tessellate(surface, seeds)
+    cells = tessellate(surface, seeds, None, density)
     start = float(cells.energy.sum())
     history, guess = [start], cells.first
     if iterations == 0:
@@ -307,7 +315,7 @@ def quasi_newton(
     def scaled(flat: Floats) -> tuple[float, Floats]:
         nonlocal guess
         moved = middle + length * flat.reshape(-1, 3)
-        cells = tessellate(surface, moved, guess)
+        cells = tessellate(surface, moved, guess, density)
         guess = cells.first
         energy, gradient = _energy_and_gradient(cells, moved)
         scale = len(seeds) / start

@@ -11,6 +11,7 @@ from numba import njit
 from drkid.mesh import Floats, Ints, TriMesh
 from drkid.remesh.edge_flip import LEAST_VALENCE, flip_edge, is_harmless
 from drkid.remesh.half_edge import are_joined, following, half_edges, mesh_of, preceding, valence_of
+from drkid.remesh.sizing_field import SizingField, goals
 
 ROOM = 160  # vertices around a flip that may move
 RINGS = 2  # of them
@@ -50,10 +51,10 @@ def _gather(origin: Ints, twin: Ints, start: Ints, h: int, marks: Ints, mark: in
 
 @njit(cache=True)
 def _energy(
-    edges: tuple[Ints, Ints, Ints], vertices: Floats, length: float, marks: Ints, mark: int, region: Ints
+    edges: tuple[Ints, Ints, Ints], vertices: Floats, goal: Floats, marks: Ints, mark: int, region: Ints
 ) -> float:
     origin, twin, start = edges
-    # Σ (l / length − 1)² over the edges at the region's vertices, and the valences' share.
+    # Σ (l / goal − 1)² over the edges at the region's vertices, and the valences' share.
     total = 0.0
     for v in region:
         e = start[v]
@@ -65,7 +66,7 @@ def _energy(
                 squared = 0.0
                 for d in range(3):
                     squared += (vertices[w, d] - vertices[v, d]) ** 2
-                total += (np.sqrt(squared) / length - 1) ** 2
+                total += (np.sqrt(squared) / ((goal[v] + goal[w]) / 2) - 1) ** 2
             valence += 1
             e = twin[preceding(e)]
             if e == end:
@@ -76,7 +77,7 @@ def _energy(
 
 @njit(cache=True)
 def _relax(
-    origin: Ints, twin: Ints, start: Ints, vertices: Floats, normals: Floats, length: float, region: Ints
+    origin: Ints, twin: Ints, start: Ints, vertices: Floats, normals: Floats, goal: Floats, region: Ints
 ) -> None:
     # Gauss and Seidel's sweeps: each vertex by the Newton step of its springs, in its tangent plane.
     for _ in range(SWEEPS):
@@ -91,6 +92,7 @@ def _relax(
                     vertices[w, 1] - vertices[v, 1],
                     vertices[w, 2] - vertices[v, 2],
                 )
+                length = (goal[v] + goal[w]) / 2
                 surplus = 1 - length / max(np.sqrt(p * p + q * q + r * r), 1e-3 * length)
                 x += surplus * p
                 y += surplus * q
@@ -120,7 +122,7 @@ def _is_candidate(origin: Ints, twin: Ints, start: Ints, h: int) -> bool:
 
 @njit(cache=True)
 def _glide(
-    edges: tuple[Ints, Ints, Ints], vertices: Floats, normals: Floats, length: float, order: Ints, heat: Floats
+    edges: tuple[Ints, Ints, Ints], vertices: Floats, normals: Floats, goal: Floats, order: Ints, heat: Floats
 ) -> int:
     # Try the flips of `order`, each with its share of heat; the number kept.
     origin, twin, start = edges
@@ -132,12 +134,12 @@ def _glide(
             continue
         mark += 1
         region = room[: _gather(origin, twin, start, h, marks, mark, room)]
-        before = _energy(edges, vertices, length, marks, mark, region)
+        before = _energy(edges, vertices, goal, marks, mark, region)
         for k in range(len(region)):
             saved[k] = vertices[region[k]]
         flip_edge(origin, twin, start, h)
-        _relax(origin, twin, start, vertices, normals, length, region)
-        if _energy(edges, vertices, length, marks, mark, region) < before + heat[i]:
+        _relax(origin, twin, start, vertices, normals, goal, region)
+        if _energy(edges, vertices, goal, marks, mark, region) < before + heat[i]:
             kept += 1
         else:
             for _ in range(3):  # four flips of an edge are none
@@ -147,21 +149,23 @@ def _glide(
     return kept
 
 
-def glide(mesh: TriMesh, sweeps: int, heat: float, rng: np.random.Generator) -> TriMesh:
+def glide(
+    mesh: TriMesh, sweeps: int, heat: float, rng: np.random.Generator, sizing: SizingField | None = None
+) -> TriMesh:
     """Try to flip every edge near irregular vertices, in random order, `sweeps` times.
 
-    A flip is kept where the squared relative errors of the edges around it, and what irregular valences cost, sum to
+    A flip is kept where the squared relative errors of the edges around it, against the mean edge or what a sizing
+    field says, and what irregular valences cost, sum to
     less than before or, as in annealing, to more by no more than a random share of `heat` (exponentially distributed),
     which falls to nothing with the sweeps. Vertices move in their tangent planes. The mesh is closed and manifold.
     """
     edges, vertices, normals = half_edges(mesh), mesh.vertices.copy(), mesh.vertex_normals
+    goal = goals(mesh, sizing)
     halves = np.arange(len(edges.origin))
     halves = halves[halves < edges.twin]
     for left in range(sweeps - 1, -1, -1):
         heats = heat * left / sweeps * rng.exponential(size=len(halves))
-        kept = _glide(
-            (edges.origin, edges.twin, edges.start), vertices, normals, mesh.mean_edge, rng.permutation(halves), heats
-        )
+        kept = _glide((edges.origin, edges.twin, edges.start), vertices, normals, goal, rng.permutation(halves), heats)
         if kept == 0:
             break
     return mesh_of(edges, vertices)

@@ -22,6 +22,7 @@ from drkid.remesh.half_edge import (
     preceding,
     valence_of,
 )
+from drkid.remesh.sizing_field import SizingField
 
 QUADRIC_WEIGHT = 10.0  # of the squared distance from the surface, against the squared length of the edge
 ROUND = 0.1  # share of the edges that one round may collapse: costs are then never far out of date
@@ -138,24 +139,29 @@ def _costs(edges: HalfEdges, vertices: Floats, quadrics: Floats) -> Floats:
     return ((vertices[stay] - vertices[go]) ** 2).sum(axis=1) + QUADRIC_WEIGHT * away
 
 
-def collapse_to(mesh: TriMesh, count: int) -> TriMesh:
+def collapse_to(mesh: TriMesh, count: int, sizing: SizingField | None = None) -> TriMesh:
     """Collapse edges onto one of their ends, short and flat ones first, until `count` vertices are left or none can go.
+
+    With a sizing field, short is what is short beside the length wanted there.
 
     Every vertex of the result is one of the mesh, which is closed and manifold; so is the result, with the same genus.
     """
     middle = mesh.vertices.mean(axis=0)
     mesh = mesh.moved(mesh.vertices - middle)  # the quadrics' squares cancel less near the origin
     quadrics = _vertex_quadrics(mesh)
+    weight = None if sizing is None else sizing(mesh.vertices + middle) ** -2
     for limits in LIMITS:
         while len(mesh.vertices) > count:
             edges = half_edges(mesh)
-            order = np.argsort(_costs(edges, mesh.vertices, quadrics), kind="stable")
+            costs = _costs(edges, mesh.vertices, quadrics)
+            order = np.argsort(costs if weight is None else costs * weight[edges.origin], kind="stable")
             budget = min(len(mesh.vertices) - count, max(1, int(ROUND * len(mesh.vertices))))
             done = _collapse_round(*edges, mesh.vertices.copy(), order, budget, limits)
             if not done:
                 break
             stayed, went = np.array(done).T
             quadrics[stayed] += quadrics[went]
-            quadrics = quadrics[np.unique(edges.origin[edges.origin >= 0])]
+            left = np.unique(edges.origin[edges.origin >= 0])
+            quadrics, weight = quadrics[left], None if weight is None else weight[left]
             mesh = mesh_of(edges, mesh.vertices)
     return mesh.moved(mesh.vertices + middle)

@@ -8,8 +8,7 @@ import numpy as np
 
 from drkid.measure import project, smooth_normals
 from drkid.mesh import TriMesh
-from drkid.remesh.closest_point import ClosestPoint
-from drkid.remesh.surface_fit import barycentric
+from drkid.remesh.closest_point import ClosestPoint, barycentric
 
 
 def offset_surface(closest: ClosestPoint, mesh: TriMesh) -> TriMesh:

@@ -18,10 +18,11 @@ STEPS, LAST_STEPS = 2, 5  # of the placement in a round, and in the end: then it
 def polished(mesh: TriMesh, fit: SurfaceFit, rng: np.random.Generator) -> TriMesh:
     """Edges nearly equal, few vertices of other valence than six, faces on both sides of the surface in the mean.
 
-    The mesh is closed and manifold, and stays so; its vertices keep their numbers.
+    With a sizing field of the fit, edges are as long as that says. The mesh is closed and manifold, and stays so; its
+    vertices keep their numbers.
     """
     for left in range(ROUNDS, 0, -1):
-        mesh = glide(mesh, SWEEPS, HEAT * (left - 1) / ROUNDS, rng)
+        mesh = glide(mesh, SWEEPS, HEAT * (left - 1) / ROUNDS, rng, fit.sizing)
         for _ in range(STEPS):
             mesh = fit.stepped(mesh)
     for _ in range(LAST_STEPS):

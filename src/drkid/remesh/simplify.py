@@ -19,6 +19,7 @@ from drkid.remesh.farthest_point import farthest_points
 from drkid.remesh.midpoint_subdivision import subdivided
 from drkid.remesh.offset_surface import offset_surface
 from drkid.remesh.polish import polished
+from drkid.remesh.sizing_field import SizingField, sizing_field
 from drkid.remesh.surface_fit import surface_fit
 from drkid.remesh.tangential_relaxation import relax
 from drkid.remesh.vertex_clustering import clustered
@@ -43,7 +44,8 @@ def simplify(surface: Surface, spec: KitSpec, progress: Progress = silent) -> Si
     disks, as on parts thinner than an edge, seeds are added until the dual is right, and edges collapsed down to the
     number again. Flips and least squares then make edges and valences even and halve the distance (`polish`): vertices
     lie outside where the surface is convex, so that faces do not cut off what is between. The mesh has the surface's
-    genus, looks outward and is in one piece; the same seed gives the same mesh.
+    genus, looks outward and is in one piece; the same seed gives the same mesh. `spec.adapt` makes edges shorter where
+    the surface bends more, in every one of these steps.
 
     Raises:
         SpecError: there are too few vertices for the genus, or too many for a kit.
@@ -52,20 +54,42 @@ def simplify(surface: Surface, spec: KitSpec, progress: Progress = silent) -> Si
     _check_surface(surface.mesh)
     count = _checked_count(surface.mesh, spec)
     progress("spreading seeds" if is_compiled() else "compiling (once)", 0.0)
-    seeds = farthest_points(surface.mesh, count, np.random.default_rng(spec.seed))
-    coarse = clustered(surface.mesh, max(FEWEST_TRIANGLES, CELL_TRIANGLES * count))
-    seeds, before = lloyd(coarse, seeds, spec.lloyd_iterations)
+    domain = _domain(surface.mesh, count, spec.adapt)
+    coarse, density, sizing = domain.triangles, domain.density, domain.sizing
+    seeds = farthest_points(surface.mesh, count, np.random.default_rng(spec.seed), sizing)
+    seeds, before = lloyd(coarse, seeds, spec.lloyd_iterations, density)
     seeds, after = quasi_newton(
         coarse,
         seeds,
         spec.newton_iterations,
         lambda done: progress("evening out cells", 0.1 + 0.5 * done / spec.newton_iterations),
+        density,
     )
     progress("joining cells", 0.6)
     closest = ClosestPoint(surface.mesh)
-    found = _best(closest, seeds, count, spec)
+    found = _best(closest, seeds, count, spec, sizing)
     progress("done", 1.0)
     return replace(found, energy=tuple(before + after), target=offset_surface(closest, found.mesh))
+
+
+@dataclass(frozen=True, eq=False)
+class _Domain:
+    """What integrals over cells are taken on: `triangles`, their `density`; the lengths wanted. None: all the same."""
+
+    triangles: TriMesh
+    density: Floats | None = None
+    sizing: SizingField | None = None
+
+
+def _domain(surface: TriMesh, count: int, adapt: float) -> _Domain:
+    triangles = max(FEWEST_TRIANGLES, CELL_TRIANGLES * count)
+    if not adapt:
+        return _Domain(clustered(surface, triangles))
+    fine = subdivided(surface, FINENESS * count)
+    sizing = sizing_field(fine, count, adapt)
+    smallest = (sizing.length.mean() / sizing.length.min()) ** 2  # cells of the densest parts need their triangles too
+    coarse = clustered(fine, int(smallest * triangles))
+    return _Domain(coarse, sizing.density(coarse.corners.mean(axis=1)), sizing)
 
 
 def _check_surface(mesh: TriMesh) -> None:
@@ -109,20 +133,20 @@ def _faces(vertices: int, genus: int) -> int:
     return 2 * vertices - 4 + 4 * genus
 
 
-def _best(closest: ClosestPoint, seeds: Floats, count: int, spec: KitSpec) -> Simplified:
+def _best(closest: ClosestPoint, seeds: Floats, count: int, spec: KitSpec, sizing: SizingField | None) -> Simplified:
     """The first mesh without flaws: cuts through itself, slivers and folds; or else the one that has least of them."""
     surface, reached = closest.surface, list[int]()
-    fit = surface_fit(closest, count, np.random.default_rng([spec.seed, FITTING]))
+    fit = surface_fit(closest, count, np.random.default_rng([spec.seed, FITTING]), sizing)
     best: tuple[tuple[int, float], Simplified] | None = None
-    for draft in _drafts(closest, seeds, count, spec):
+    for draft in _drafts(closest, seeds, count, spec, sizing):
         if len(draft.mesh.vertices) != count or not is_twin(draft.mesh, surface):
             reached.append(len(draft.mesh.vertices))
             continue
-        evened = _evened(draft.mesh, closest, draft.rounds)
+        evened = _evened(draft.mesh, closest, draft.rounds, sizing)
         for mesh in (polished(evened, fit, np.random.default_rng([spec.seed, GLIDING])), evened, draft.mesh):
             flaws = _flaws(mesh)
             if best is None or flaws < best[0]:
-                best = flaws, Simplified(mesh, (), draft.notes + _unevenness(mesh))
+                best = flaws, Simplified(mesh, (), draft.notes + _unevenness(mesh, sizing, spec))
             if flaws == (0, 0):
                 return best[1]
     if best is None:
@@ -147,7 +171,9 @@ class _Draft:
     notes: tuple[str, ...] = ()
 
 
-def _drafts(closest: ClosestPoint, seeds: Floats, count: int, spec: KitSpec) -> Iterator[_Draft]:
+def _drafts(
+    closest: ClosestPoint, seeds: Floats, count: int, spec: KitSpec, sizing: SizingField | None
+) -> Iterator[_Draft]:
     """Meshes of `count` vertices on the surface, or of more where it cannot be done; the most even first."""
     plain = dual(closest, seeds)
     if plain is not None:
@@ -160,23 +186,31 @@ def _drafts(closest: ClosestPoint, seeds: Floats, count: int, spec: KitSpec) -> 
         f"edges were collapsed to reach {_faces(count, refined.genus)}",
     )
     if needed >= count:  # two seeds may have gone to the same vertex
-        yield _Draft(collapse_to(refined, count), EVENING, note if needed > count else ())
+        yield _Draft(collapse_to(refined, count, sizing), EVENING, note if needed > count else ())
     rng = np.random.default_rng(spec.seed)
     for factor in (2, 4):
-        denser = refined_dual(fine, farthest_points(fine, factor * count, rng))
-        yield _Draft(collapse_to(denser, count), EVENING, note)
-    yield _Draft(collapse_to(fine, count), EVENING, note)
+        denser = refined_dual(fine, farthest_points(fine, factor * count, rng, sizing))
+        yield _Draft(collapse_to(denser, count, sizing), EVENING, note)
+    yield _Draft(collapse_to(fine, count, sizing), EVENING, note)
 
 
-def _evened(mesh: TriMesh, closest: ClosestPoint, rounds: int) -> TriMesh:
+def _evened(mesh: TriMesh, closest: ClosestPoint, rounds: int, sizing: SizingField | None) -> TriMesh:
     for _ in range(rounds):
         mesh, _ = flip_towards_valence_six(mesh)
-        mesh = relax(mesh, closest, RELAXATIONS)
+        mesh = relax(mesh, closest, RELAXATIONS, sizing)
     return mesh
 
 
-def _unevenness(mesh: TriMesh) -> tuple[str, ...]:
+def _unevenness(mesh: TriMesh, sizing: SizingField | None, spec: KitSpec) -> tuple[str, ...]:
     spread = edge_spread(mesh)
+    if sizing is not None:
+        shortest, longest = mesh.edge_lengths.min() / mesh.mean_edge, mesh.edge_lengths.max() / mesh.mean_edge
+        lost = "; the palette solver makes them two or three lengths again, --method pressure keeps more of it"
+        return (
+            f"edges of the simplified mesh are unequal on purpose (--adapt {spec.adapt:g}), shorter where the surface "
+            f"bends more: {shortest:.2f} to {longest:.2f} of the mean, standard deviation {100 * spread:.0f} %"
+            f"{lost if spec.method == 'palette' else ''}",
+        )
     if spread <= UNEVEN:
         return ()
     return (f"edges are uneven (standard deviation {100 * spread:.0f} % of the mean); more faces help",)

@@ -1,8 +1,8 @@
 """Vertices where the mesh is nearest to the surface and its edges are most even: one least-squares problem.
 
 Hoppe, DeRose, Duchamp, McDonald and Stuetzle, "Mesh optimization" (SIGGRAPH 1993), sections 3 and 4: squared distances
-of sample points and springs along edges, here of the mean length and not of none. A mesh whose vertices lie on a convex
-surface is inside it; the least squares lift it until it lies on both sides, which keeps the volume too.
+of sample points and springs along edges, here of a goal, the mean length, and not of none. A mesh whose vertices lie on
+a convex surface is inside it; the least squares lift it until it lies on both sides, which keeps the volume too.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,8 @@ from numba import njit
 
 from drkid.measure import project, sample
 from drkid.mesh import Floats, Ints, TriMesh
-from drkid.remesh.closest_point import ClosestPoint
+from drkid.remesh.closest_point import ClosestPoint, barycentric
+from drkid.remesh.sizing_field import SizingField, goals
 from drkid.remesh.tangential_relaxation import moved_where_harmless
 
 CLOSENESS = 3.0  # of squared distances against squared errors of edges: more costs evenness and narrows angles
@@ -129,17 +130,18 @@ class Points(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SurfaceFit:
-    """A surface with what is needed to fit meshes to it: `points` (P, 3) spread over it, and its tree."""
+    """A surface with what is needed to fit meshes to it: its tree, `points` (P, 3) spread over it, lengths of edges."""
 
     closest: ClosestPoint
     points: Floats
+    sizing: SizingField | None = None
 
     def stepped(self, mesh: TriMesh) -> TriMesh:
         """One step of Gauss and Newton towards closeness and even edges; the mesh is closed and manifold.
 
-        Minimised are the mean squared distance of the two surfaces, from both sides, times `CLOSENESS`, and the mean
-        squared error of the edges, all in units of the mean edge. A vertex stays where it is if one of its faces would
-        turn by 90° or become a sliver or a fold.
+        Minimised are the mean squared distance of the two surfaces, from both sides, times `CLOSENESS`, in units of the
+        mean edge, and the mean squared relative error of the edges. A vertex stays where it is if one of its faces
+        would turn by 90° or become a sliver or a fold.
         """
         pairs = _joined(self._from_mesh(mesh), self._from_surface(mesh))
         squares = pairs.away**2
@@ -151,15 +153,18 @@ class SurfaceFit:
         np.add.at(right, mesh.faces.ravel(), -gradient.reshape(-1, 3))
         ends, lengths = mesh.vertices[mesh.edges], mesh.edge_lengths
         along = (ends[:, 1] - ends[:, 0]) / lengths[:, None]
-        surplus = lengths - mesh.mean_edge
-        stiffness = (1 + PEAK_EDGE * surplus**2 / max(float((surplus**2).mean()), np.finfo(float).tiny)) / len(lengths)
+        goal = goals(mesh, self.sizing)
+        wanted = goal[mesh.edges].mean(axis=1)
+        surplus, weight = lengths - wanted, (mesh.mean_edge / wanted) ** 2  # relative errors count
+        squares = weight * surplus**2
+        stiffness = weight * (1 + PEAK_EDGE * squares / max(float(squares.mean()), np.finfo(float).tiny)) / len(lengths)
         pull = (stiffness * surplus)[:, None] * along
         np.add.at(right, mesh.edges[:, 0], pull)
         np.add.at(right, mesh.edges[:, 1], -pull)
         system = System(mesh.faces, matrix, mesh.edges, along, stiffness, DAMPING / len(mesh.vertices))
         step = _conjugate_gradients(system, right)
         size = np.linalg.norm(step, axis=1, keepdims=True)
-        step *= np.minimum(1, REACH * mesh.mean_edge / np.maximum(size, np.finfo(float).tiny))
+        step *= np.minimum(1, REACH * goal[:, None] / np.maximum(size, np.finfo(float).tiny))
         return moved_where_harmless(mesh, mesh.vertices + step)
 
     def _from_mesh(self, mesh: TriMesh) -> Points:
@@ -181,9 +186,11 @@ class SurfaceFit:
         return 1e-9 * self.closest.surface.diagonal
 
 
-def surface_fit(closest: ClosestPoint, count: int, rng: np.random.Generator) -> SurfaceFit:
+def surface_fit(
+    closest: ClosestPoint, count: int, rng: np.random.Generator, sizing: SizingField | None = None
+) -> SurfaceFit:
     """For meshes of `count` vertices."""
-    return SurfaceFit(closest, sample(closest.surface, max(FEWEST_POINTS, POINTS * count), rng))
+    return SurfaceFit(closest, sample(closest.surface, max(FEWEST_POINTS, POINTS * count), rng), sizing)
 
 
 def _joined(one: Points, two: Points) -> Points:
@@ -203,14 +210,3 @@ def _signed(here: Floats, there: Floats, normals: Floats, rounding: float) -> tu
     sign = np.where(np.einsum("ij,ij->i", apart, normals) < 0, -1.0, 1.0)
     direction = apart * (sign / np.maximum(size, rounding))[:, None]
     return size * sign, np.where((size > rounding)[:, None], direction, normals)
-
-
-def barycentric(corners: Floats, points: Floats) -> Floats:
-    """(P, 3): barycentric coordinates of points in triangles (Ericson, Real-Time Collision Detection, 3.4)."""
-    a, b, c = np.moveaxis(corners, 1, 0)
-    u, v, w = b - a, c - a, points - a
-    uu, uv, vv = (np.einsum("ij,ij->i", p, q) for p, q in ((u, u), (u, v), (v, v)))
-    wu, wv = (np.einsum("ij,ij->i", w, q) for q in (u, v))
-    area = np.maximum(uu * vv - uv * uv, np.finfo(float).tiny)
-    s, t = (vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area
-    return np.clip(np.column_stack([1 - s - t, s, t]), 0, 1)

@@ -10,6 +10,7 @@ from numba import njit
 from drkid.mesh import Floats, Ints, TriMesh
 from drkid.remesh.closest_point import ClosestPoint
 from drkid.remesh.half_edge import dot, face_normal, following, half_edges, preceding, shape
+from drkid.remesh.sizing_field import SizingField, goals
 
 LEAST_SHAPE = 0.5  # of a face after the move, unless one was worse before
 STEP = 0.8  # of the mean pull of the springs at a vertex; all move at once, so less than the whole
@@ -58,20 +59,22 @@ def moved_where_harmless(mesh: TriMesh, targets: Floats) -> TriMesh:
     return mesh.moved(vertices)
 
 
-def relax(mesh: TriMesh, closest: ClosestPoint, rounds: int) -> TriMesh:
+def relax(mesh: TriMesh, closest: ClosestPoint, rounds: int, sizing: SizingField | None = None) -> TriMesh:
     """`rounds` times: a step towards even edges along the surface, then to the closest point of the surface.
 
-    Each edge is a spring of the mean length. (The neighbours' mean, the textbook's target, evens out areas: on coarse
-    meshes it left edges a third less even and cut corners of the shape.) A vertex stays where it is in a round if one
-    of its faces would turn by 90° or become a sliver or a fold, or if the surface looks the other way at its new place
-    (the far side of a thin wall). The mesh is closed and manifold; its faces are kept.
+    Each edge is a spring of the mean length, or of that of a sizing field. (The neighbours' mean, the textbook's
+    target, evens out areas: on coarse meshes it left edges a third less even and cut corners of the shape.) A vertex
+    stays where it is in a round if one of its faces would turn by 90° or become a sliver or a fold, or if the surface
+    looks the other way at its new place (the far side of a thin wall). The mesh is closed and manifold; its faces are
+    kept.
     """
     edges = half_edges(mesh)
     ends = np.concatenate([mesh.edges, mesh.edges[:, ::-1]])
     for _ in range(rounds):
         vertices, normals = mesh.vertices.copy(), mesh.vertex_normals
         along = vertices[ends[:, 1]] - vertices[ends[:, 0]]
-        surplus = 1 - mesh.mean_edge / np.linalg.norm(along, axis=1, keepdims=True)
+        goal = goals(mesh, sizing)[ends].mean(axis=1, keepdims=True)
+        surplus = 1 - goal / np.linalg.norm(along, axis=1, keepdims=True)
         step = np.zeros_like(vertices)
         np.add.at(step, ends[:, 0], surplus * along)
         step *= STEP / mesh.valence[:, None]

@@ -21,6 +21,7 @@ Way = Literal["filled", "cut"]
 TOUCHING = np.ones((3, 3, 3))  # 26 neighbours
 MOST_AT_ONCE = 8  # voxels of a patch that is taken together with others; larger ones are looked for anew
 MARGIN = 2  # voxels around a patch beyond which the surface does not change
+MOST_TOLD = 12  # closings that are told one by one
 WAYS: tuple[Way, Way] = ("filled", "cut")
 
 
@@ -50,6 +51,13 @@ class _Patch:
     def rank(self) -> tuple[int, int, tuple[float, ...]]:
         """Fewest voxels first, filling before cutting, then the place."""
         return self.count, WAYS.index(self.way), tuple(self.places.mean(axis=0))
+
+
+def handles_kept(genus: int) -> str:
+    """What a user should know of handles that nobody asked to close."""
+    return (
+        f"the surface has {genus} handle{'s' * (genus > 1)}; where they are noise, --max-genus closes the smallest ones"
+    )
 
 
 def without_handles(mask: Bools, most: int, spacing: Floats) -> tuple[Bools, tuple[Closing, ...]]:

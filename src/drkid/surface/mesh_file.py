@@ -18,6 +18,8 @@ from drkid.mesh import Floats, Ints, TriMesh
 from drkid.progress import Progress
 from drkid.spec import KitSpec
 from drkid.surface.bodies import outermost, signed_volumes
+from drkid.surface.handle import MOST_TOLD, handles_kept
+from drkid.surface.loop_surgery import ClosedHandle, without_mesh_handles
 from drkid.surface.welding import welded
 
 STL_HEADER, STL_TRIANGLE = 84, 50  # bytes of a binary STL
@@ -47,7 +49,7 @@ def surface_of_mesh_file(path: Path, spec: KitSpec, progress: Progress) -> Surfa
     Raises:
         SpecError: label, threshold or spacing is given, which are for volumes.
         InputError: a mesh that cannot be read, is empty, not finite, open, not manifold or not orientable, or has
-            more handles than `spec.max_genus`.
+            more handles than `spec.max_genus` that cannot be closed.
     """
     _refuse_volume_parameters(spec)
     suffix = checked_suffix(path, MESH_SUFFIXES)
@@ -60,13 +62,18 @@ def surface_of_mesh_file(path: Path, spec: KitSpec, progress: Progress) -> Surfa
     body = _oriented(body)
     _check(body, path.name)
     body, _ = outermost(body)
-    _require_few_handles(body, spec, path.name)
+    closed: tuple[ClosedHandle, ...] = ()
+    if spec.max_genus is not None:
+        progress("closing handles", 0.8)
+        body, closed = without_mesh_handles(body, spec.max_genus)
     progress("surface", 1.0)
-    notes: tuple[str, ...] = ()
+    notes = _closings(closed, spec.unit or "units")
     if count > 1:
-        notes = (f"body {rank + 1} of {count} taken; the other{'s' * (count > 2)} left out (--component)",)
+        notes.insert(0, f"body {rank + 1} of {count} taken; the other{'s' * (count > 2)} left out (--component)")
+    if body.genus and spec.max_genus is None:
+        notes.append(handles_kept(body.genus))
     source = Source(path.name, sha256_of(path), voxel_unit=spec.unit, component=rank + 1)
-    return Surface(body, source, components=count, debris_dropped=count - 1, notes=notes)
+    return Surface(body, source, components=count, debris_dropped=count - 1, notes=tuple(notes))
 
 
 def _refuse_volume_parameters(spec: KitSpec) -> None:
@@ -148,14 +155,17 @@ def _check(mesh: TriMesh, name: str) -> None:
     _refuse(int((altitude < FLAT_DIAGONALS * mesh.diagonal).sum()), "faces without area", name, "degenerate")
 
 
-def _require_few_handles(mesh: TriMesh, spec: KitSpec, name: str) -> None:
-    if spec.max_genus is not None and mesh.genus > spec.max_genus:
-        raise InputError(
-            f"the handles of the mesh in {name} cannot be closed: that is done on voxels",
-            wanted=f"a surface of genus {spec.max_genus} at most (--max-genus)",
-            found=f"genus {mesh.genus}",
-            remedy=f"--max-genus {mesh.genus}, or the segmentation that the mesh was made of, as a volume",
-        )
+def _closings(closed: tuple[ClosedHandle, ...], unit: str) -> list[str]:
+    notes = [
+        f"a handle closed (--max-genus): {'a tunnel filled' if one.way == 'filled' else 'a bridge cut'} at "
+        f"({', '.join(f'{x:.4g}' for x in one.centre)}) {unit}, {one.around:.3g} {unit} around"
+        for one in closed[:MOST_TOLD]
+    ]
+    if len(closed) > MOST_TOLD:
+        left = closed[MOST_TOLD:]
+        longest = max(one.around for one in left)
+        notes.append(f"{len(left)} more handles closed, {longest:.3g} {unit} around at most")
+    return notes
 
 
 def _refuse(count: int, what: str, name: str, problem: str) -> None:

@@ -8,13 +8,11 @@ from drkid.kit import LabelVolume, Source, Surface
 from drkid.mesh import Floats, TriMesh
 from drkid.progress import Progress
 from drkid.spec import KitSpec
-from drkid.surface.handle import Closing, without_handles
+from drkid.surface.handle import MOST_TOLD, Closing, handles_kept, without_handles
 from drkid.surface.marching_cubes import grid_surface, slid
 from drkid.surface.staircase import without_staircase
 from drkid.voxels import Components, Foreground, VoxelObject, Voxels, chosen_component, components, foreground
 from drkid.voxels import voxel_object as object_of
-
-MOST_TOLD = 12  # closings that are told one by one
 
 
 def surface_of_volume(volume: LabelVolume, spec: KitSpec, progress: Progress) -> Surface:
@@ -125,8 +123,7 @@ def _closings(closed: tuple[Closing, ...], taken: VoxelObject, volume: LabelVolu
 def _notes_of(mesh: TriMesh, moved: float) -> list[str]:
     notes: list[str] = []
     if mesh.genus:
-        handles = f"{mesh.genus} handle{'s' * (mesh.genus > 1)}"
-        notes.append(f"the surface has {handles}; where they are noise, --max-genus closes the smallest ones")
+        notes.append(handles_kept(mesh.genus))
     if moved:
         notes.append(f"the staircase of voxels is removed: nothing moved by more than {moved:.2f} voxels")
     return notes
