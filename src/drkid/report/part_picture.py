@@ -6,7 +6,7 @@ from drkid.report.picture import Body, camera, render
 from drkid.report.png import png_bytes
 
 AZIMUTH_DEGREES, ELEVATION_DEGREES = -60.0, -40.0  # from inside, where pockets and marks are
-WIDTH, HEIGHT = 96, 72  # in pixels
+WIDTH, HEIGHT = 192, 144  # in pixels
 
 
 def part_picture(mesh: TriMesh, colour: str) -> bytes:

@@ -175,7 +175,6 @@
     clearInterval(playing);
     playing = 0;
     at("play").textContent = on ? "Pause" : "Play";
-    at("play").setAttribute("aria-pressed", String(on));
     if (!on) return;
     if (Number(at("step").value) >= kit.pieces.length) toStep(1);
     playing = setInterval(() => {
