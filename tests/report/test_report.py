@@ -7,9 +7,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from drkid.export.bill_of_materials import moulding
+from drkid.export.bill_of_materials import moulding, piece_row
+from drkid.export.document import KitDocument
 from drkid.export.kit_document import parts_list, printed_meshes
+from drkid.mesh import TriMesh
+from drkid.report.part_picture import part_picture
 from drkid.report.report import json_in_html, report_html
+from drkid.report.scene import Scene
 from drkid.report.tables import number
 
 
@@ -151,5 +155,43 @@ def test_every_figure_stands_in_a_row_of_its_own(opened, kit):
     assert not any("{" in value for value in figures.values())
 
 
-def test_it_stays_small(documents):
+def repeated(scene: Scene, times: int) -> Scene:
+    """The kit so many times over, as if it were one kit, each copy with shapes of its own."""
+    plain = scene.document.model_dump(by_alias=True)
+    faces, corners = len(scene.assembled.faces), len(scene.assembled.vertices)
+    many = {name: [] for name in ("classes", "pieces", "joints", "assembly")}
+
+    def file(name, k):
+        return name.replace(".stl", f"_{k}.stl")
+
+    for k in range(times):
+        for one in plain["classes"]:
+            parts = [part | {"file": file(part["file"], k)} for part in one["parts"]]
+            many["classes"].append(one | {"id": f"{one['id']}{k}", "parts": parts})
+        for one in plain["pieces"]:
+            moved = {"face": one["face"] + k * faces, "corners": [v + k * corners for v in one["corners"]]}
+            many["pieces"].append(one | moved | {"class": f"{one['class']}{k}", "part": file(one["part"], k)})
+        for one in plain["joints"]:
+            many["joints"].append(one | {"faces": tuple(f + k * faces for f in one["faces"])})
+        for one in plain["assembly"]:
+            many["assembly"].append(
+                {"step": one["step"] + k * faces, "face": one["face"] + k * faces, "joins": one["joins"]}
+            )
+    mesh = TriMesh(
+        np.vstack([scene.assembled.vertices] * times),
+        np.vstack([scene.assembled.faces + k * corners for k in range(times)]),
+    )
+    parts = {file(name, k): part for k in range(times) for name, part in scene.parts.items()}
+    return Scene(KitDocument.model_validate(plain | many), parts, scene.surface, mesh)
+
+
+def test_it_stays_small(documents, scene, kit):
+    """One kit, and one of 540 pieces of as many shapes as nine such kits have, which is more than any real one."""
     assert (documents / "report.html").stat().st_size < 1_000_000
+    large = repeated(scene, 9)
+    rows = [piece_row(file, 0, 5, 2000.0, kit.spec) for file in large.parts]
+    picture = part_picture(next(iter(scene.parts.values())), "#3366CC")[1]
+    page = report_html(large, kit.spec, rows, dict.fromkeys(large.parts, picture))
+    assert len(large.document.pieces) == 540
+    assert len(large.parts) > 30
+    assert len(page.encode()) < 2_500_000

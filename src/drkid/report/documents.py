@@ -31,8 +31,8 @@ def _report(kit: Kit) -> dict[str, bytes]:
     meshes = printed_meshes(kit)
     rows = parts_list(kit, meshes)
     pictures = {row.file: part_picture(meshes[row.file], row.colour) for row in rows if row.file and row.colour}
-    named = {picture_file(file): picture for file, picture in pictures.items()}
-    return {REPORT: report_html(scene_of(kit), kit.spec, rows, pictures).encode(), **named}
+    page = report_html(scene_of(kit), kit.spec, rows, {file: small for file, (_, small) in pictures.items()})
+    return {REPORT: page.encode(), **{picture_file(file): large for file, (large, _) in pictures.items()}}
 
 
 _MAKERS: tuple[tuple[str, Callable[[Kit], dict[str, bytes]]], ...] = (

@@ -122,8 +122,9 @@ def _pieces(scene: Scene, part_number: dict[str, int], figures: dict[str, Floats
 
 
 def _packed(mesh: TriMesh) -> dict[str, str]:
-    """Vertices as base64 of float32, corners of faces as base64 of uint32."""
-    arrays = {"vertices": mesh.vertices.astype("<f4"), "faces": mesh.faces.astype("<u4")}
+    """Vertices as base64 of float32, corners of faces as base64 of uint16, or of uint32 where these are too few."""
+    index = "<u2" if len(mesh.vertices) < 2**16 else "<u4"
+    arrays = {"vertices": mesh.vertices.astype("<f4"), "faces": mesh.faces.astype(index)}
     return {name: base64.b64encode(array.tobytes()).decode("ascii") for name, array in arrays.items()}
 
 
