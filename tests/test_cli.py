@@ -1,6 +1,7 @@
 """The command line as a person types it: exit statuses, messages, and nothing half-written."""
 
 import json
+import math
 import re
 import subprocess
 import sys
@@ -140,6 +141,14 @@ def refused(arguments: list[str], capsys) -> str:
         (["--classes", "11"], ["11", "--method pressure"]),
         (["--spec", "nowhere.toml"], ["nowhere.toml", "cannot be read"]),
         (["--label", "3"], ["label"]),
+        (["--printer", "ender-2"], ["printer", "ender-3", "ender-2"]),
+        (["--printer", "ender-3", "--bed", "300x300x300"], ["printer is ender-3", "bed_mm"]),
+        (["--bed", "300x300"], ["bed_mm"]),
+        (["--spares", "few"], ["spares", "whole number", "5%", "few"]),
+        (["--price-per-kg", "-3"], ["price_per_kg", "greater than or equal to 0"]),
+        (["--mould-price", "900"], ["mould_price is given", "price_per_kg is not"]),
+        (["--paper", "a5"], ["paper", "a4", "a5"]),
+        (["--net-scale", "0"], ["net_scale", "greater than 0"]),
     ],
 )
 def test_bad_parameters_are_explained_and_nothing_is_written(flags, words, potato_file, tmp_path, capsys, monkeypatch):
@@ -148,6 +157,22 @@ def test_bad_parameters_are_explained_and_nothing_is_written(flags, words, potat
     for word in words:
         assert word in text
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_parts_list_of_a_kit_follows_printer_spares_and_prices(potato_file, tmp_path, capsys):
+    prices = ["--price-per-kg", "300", "--mould-price", "900", "--spares", "10%", "--printer", "prusa-mini"]
+    flags = ["--tolerance-percent", "50", "--no-documents", *prices, *QUICK]
+    assert run(["make", str(potato_file), "--out", str(tmp_path / "kit"), "--json", *flags]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["spec"]["bed_mm"] == [180, 180, 180]
+    rows = json.loads((tmp_path / "kit" / "bom.json").read_text())
+    assert all(row["spare"] == math.ceil(row["count"] / 10) for row in rows)
+    printed = [row for row in rows if row["file"]]
+    assert all(row["mould_cost"] == 900 for row in printed)
+    assert summary["cost"]["printed"] == pytest.approx(sum(row["total_cost"] for row in printed))
+    assert summary["cost"]["moulding"]["moulds_cost"] == 900 * len(printed)
+    assert {row["picture"] for row in rows} == {None}
+    assert not (tmp_path / "kit" / "plates").exists()
 
 
 def test_more_classes_than_the_faces_that_vertices_give(potato_file, tmp_path, capsys):

@@ -4,7 +4,7 @@ from hypothesis import strategies as st
 
 import drkid
 from drkid.errors import SpecError
-from drkid.spec import MOST_WALKED_FACES, PROCESSES, UNIVERSAL, UNIVERSAL_BEVEL, KitSpec, multiset_words
+from drkid.spec import MOST_WALKED_FACES, PRINTERS, PROCESSES, UNIVERSAL, UNIVERSAL_BEVEL, KitSpec, multiset_words
 
 
 @pytest.mark.parametrize(
@@ -51,6 +51,27 @@ from drkid.spec import MOST_WALKED_FACES, PROCESSES, UNIVERSAL, UNIVERSAL_BEVEL,
         ({"bevel_degrees": "60"}, ["bevel_degrees", "60"]),
         ({"bevel_degrees": "60,170"}, ["bevel_degrees", "130"]),
         ({"bevel_degrees": "60,90", "thickening": "mean_normal"}, ["bevel_degrees", "mean_normal", "bisector"]),
+        ({"printer": "ender-2"}, ["printer", "'ender-3'", "ender-2"]),
+        ({"printer": "prusa-mk4", "bed_mm": "300x300x300"}, ["printer is prusa-mk4", "bed_mm", "one of them"]),
+        ({"bed_mm": "300x300"}, ["bed_mm"]),
+        ({"bed_mm": "300x300xhigh"}, ["bed_mm", "number"]),
+        ({"bed_mm": "0x300x300"}, ["bed_mm", "greater than 0"]),
+        ({"spares": "-1"}, ["spares", "whole number", "5%", "-1"]),
+        ({"spares": "2.5"}, ["spares", "whole number", "2.5"]),
+        ({"spares": "-5%"}, ["spares", "percentage", "-5%"]),
+        ({"spares": "nan%"}, ["spares", "percentage", "nan%"]),
+        ({"spares": "inf%"}, ["spares", "percentage"]),
+        ({"spares": "some"}, ["spares", "whole number", "some"]),
+        ({"spares": ""}, ["spares", "whole number"]),
+        ({"price_per_kg": -1}, ["price_per_kg", "greater than or equal to 0", "-1"]),
+        ({"price_per_kg": float("inf")}, ["price_per_kg", "finite"]),
+        ({"price_per_kg": 30, "mould_price": -1}, ["mould_price", "greater than or equal to 0"]),
+        ({"mould_price": 900}, ["mould_price is given", "price_per_kg is not"]),
+        ({"moulded_price_per_piece": -0.1}, ["moulded_price_per_piece", "greater than or equal to 0"]),
+        ({"paper": "a5"}, ["paper", "'a4'", "a5"]),
+        ({"net_scale": 0}, ["net_scale", "greater than 0"]),
+        ({"net_on_one_page": "perhaps"}, ["net_on_one_page", "perhaps"]),
+        ({"documents": "some"}, ["documents", "some"]),
     ],
 )
 def test_what_cannot_be_used_is_named(values, words):
@@ -78,6 +99,22 @@ def test_vertices_are_taken_as_given_and_too_few_faces_are_refused():
     assert KitSpec(vertices=50).vertex_count(3) == 50
     with pytest.raises(SpecError, match="3 handles"):
         KitSpec(faces=8).vertex_count(3)
+
+
+@pytest.mark.parametrize("printer", PRINTERS)
+def test_a_printer_gives_its_bed_and_agrees_with_it(printer):
+    spec = KitSpec.parse({"printer": printer})
+    assert spec.bed_mm == PRINTERS[printer]
+    assert KitSpec.parse({"printer": printer, "bed_mm": list(PRINTERS[printer])}) == spec
+    assert KitSpec.parse(spec.model_dump(mode="json")) == spec
+    assert all(50 < side < 1000 for side in spec.bed_mm)
+
+
+@pytest.mark.parametrize(("typed", "kept"), [("5 %", "5%"), ("7.5%", "7.5%"), ("12", "12"), (12, "12"), ("0", "0")])
+def test_spares_are_kept_as_they_are_meant(typed, kept):
+    spec = KitSpec.parse({"spares": typed})
+    assert spec.spares == kept
+    assert KitSpec.parse(spec.model_dump(mode="json")) == spec
 
 
 def test_every_field_has_help_and_a_group():

@@ -379,7 +379,12 @@ class KitSpec(BaseModel):
         if self.faces is not None and self.classes > self.faces:
             message = f"classes is {self.classes}, more than the {self.faces} faces"
             raise ValueError(message)
-        contradiction = _contradiction(self) or _contradiction_of_pieces(self) or _patch_contradiction(self)
+        contradiction = (
+            _contradiction(self)
+            or _contradiction_of_pieces(self)
+            or _contradiction_of_output(self)
+            or _patch_contradiction(self)
+        )
         if contradiction:
             raise ValueError(contradiction)
         return self
@@ -482,8 +487,6 @@ def _contradiction(spec: KitSpec) -> str:
         return (
             f"bevel_variants is {spec.bevel_variants} and {rule}: pieces of a class then have one bevel, whatever meets"
         )
-    if spec.printer is not None and spec.bed_mm != PRINTERS[spec.printer]:
-        return f"printer is {spec.printer} and bed_mm is another than its own: give one of them"
     return _palette_contradiction(spec)
 
 
@@ -507,6 +510,15 @@ def _contradiction_of_pieces(spec: KitSpec) -> str:
     lengths = next((name for name in ("palette", "like") if getattr(spec, name) is not None), None)
     if lengths is not None and scales and scales != ["size_mm"]:
         return f"{scales[0]} and {lengths} are both given: the lengths of {lengths} set the scale"
+    return ""
+
+
+def _contradiction_of_output(spec: KitSpec) -> str:
+    """What is wrong between printer and bed, or between prices; empty where nothing is."""
+    if spec.printer is not None and spec.bed_mm != PRINTERS[spec.printer]:
+        return f"printer is {spec.printer} and bed_mm is another than its own: give one of them"
+    if spec.mould_price is not None and spec.price_per_kg is None:
+        return "mould_price is given and price_per_kg is not: moulding is compared with what printing costs"
     return ""
 
 

@@ -34,14 +34,15 @@ def test_costs_are_the_mass_times_the_price():
 
 def test_without_a_price_nothing_costs_anything_and_nothing_is_compared():
     assert all(row.cost is None and row.total_cost is None for row in rows_of(KitSpec()))
-    assert moulding(rows_of(KitSpec(mould_price=3000)), KitSpec(mould_price=3000)) is None
-    assert moulding(rows_of(KitSpec(price_per_kg=30)), KitSpec(price_per_kg=30)) is None
+    for spec in (KitSpec(), KitSpec(price_per_kg=30)):
+        assert moulding(rows_of(spec), spec) is None
+        assert all(row.mould_cost is row.moulded_cost is row.break_even_count is None for row in rows_of(spec))
 
 
 def test_moulds_pay_from_the_kit_at_which_they_cost_less():
     spec = KitSpec(price_per_kg=300, mould_price=2500, moulded_price_per_piece=0.05)
     found = moulding(rows_of(spec), spec)
-    assert (found.moulds, found.moulds_cost) == (2, 5000)
+    assert (found.moulds, found.parts, found.moulds_cost) == (2, 400, 5000)
 
     def printed(kits):
         return kits * found.printed_kit_cost
@@ -52,6 +53,25 @@ def test_moulds_pay_from_the_kit_at_which_they_cost_less():
     kits = found.break_even_kits
     assert moulded(kits) <= printed(kits)
     assert moulded(kits - 1) > printed(kits - 1)
+
+
+@pytest.mark.parametrize(("price", "moulded"), [(300.0, 0.05), (30.0, 0.01), (900.0, 0.5)])
+def test_the_mould_of_a_part_pays_from_the_copy_at_which_it_costs_less(price, moulded):
+    piece, half, rod = rows_of(KitSpec(price_per_kg=price, mould_price=2500, moulded_price_per_piece=moulded))
+    for row in (piece, half):
+        assert (row.mould_cost, row.moulded_cost) == (2500, moulded)
+        if row.break_even_count is None:
+            assert row.cost <= moulded
+        else:
+            assert 2500 + row.break_even_count * moulded <= row.break_even_count * row.cost * (1 + 1e-9)
+            assert 2500 + (row.break_even_count - 1) * moulded > (row.break_even_count - 1) * row.cost
+    assert rod.mould_cost is rod.break_even_count is None
+
+
+def test_rows_name_their_part_its_hand_and_its_picture():
+    row = piece_row("parts/A2_left.stl", 0, 3, 100.0, KitSpec())
+    assert (row.part, row.picture) == ("piece A2 left", "pictures/A2_left.png")
+    assert piece_row("parts/A.stl", 0, 3, 100.0, KitSpec(documents=False)).picture is None
 
 
 def test_dear_moulding_never_pays():

@@ -10,7 +10,7 @@ import trimesh
 
 from drkid.export.bill_of_materials import bom_csv, bom_json, connector_row, piece_row, rod_row
 from drkid.export.colour import COLOURS, class_colour
-from drkid.export.layout import connector_file, part_file, plate_file
+from drkid.export.layout import connector_file, part_file, part_label, picture_file, plate_file
 from drkid.export.ply import ply_bytes
 from drkid.export.stl import rounded, stl_bytes
 from drkid.kit import class_id
@@ -77,6 +77,7 @@ def test_parts_list_is_the_same_in_csv_and_json():
     from_json = json.loads(bom_json(rows))
     columns = ["part", "file", "count", "spare", "volume_mm3", "mass_g", "colour", "diameter", "length"]
     further = ["total_mass_g", "total_length", "cost", "total_cost"]
+    further += ["mould_cost", "moulded_cost", "break_even_count", "picture"]
     assert list(from_csv[0]) == columns + further
     for one, other in zip(from_csv, from_json, strict=True):
         assert one == {name: "" if value is None else str(value) for name, value in other.items()}
@@ -92,6 +93,8 @@ def test_names_of_files():
     assert part_file(0, "right", 1) == "parts/A1_right.stl"
     assert connector_file("connector_half") == "parts/connector_half.stl"
     assert plate_file(3) == "plates/plate_03.3mf"
+    assert picture_file("parts/A2_left.stl") == "pictures/A2_left.png"
+    assert part_label("parts/A2_left.stl") == "A2 left"
 
 
 def test_colours_differ_and_repeat():

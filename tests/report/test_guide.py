@@ -41,6 +41,14 @@ def test_sides_that_meet_are_about_as_long_as_their_ticks_say(guide, scene):
             assert abs(own - other) < 0.12 * longest  # two errors of 5 % of the mean edge
 
 
+def test_parts_are_told_apart_by_bevel_and_hand(guide, scene):
+    files = [part.file for one in scene.document.classes for part in one.parts]
+    assert list(guide.part_names) == files
+    assert len(set(guide.part_names.values())) == len(files)
+    for file, name in guide.part_names.items():
+        assert file == f"parts/{name.replace(' ', '_')}.stl"
+
+
 def test_equal_sides_have_equal_ticks():
     assert ranks(np.array([3.0, 3.0 + 1e-9, 4.0])) == (1, 1, 2)
     assert ranks(np.array([3.0, 3.5, 4.0])) == (1, 2, 3)

@@ -143,6 +143,14 @@ def test_the_whole_net_fits_on_one_page(kit, paper):
     assert np.array(ratios) == pytest.approx(net.scale, rel=1e-3)
 
 
+def test_every_page_has_a_ruler_that_is_as_long_as_it_says(written):
+    for page in ElementTree.fromstring(written["net.svg"]).iter(f"{SVG}g"):
+        lines = [line for line in page.iter(f"{SVG}line") if float(line.get("y1")) < 16 and float(line.get("y2")) < 16]
+        assert max(abs(float(line.get("x2")) - float(line.get("x1"))) for line in lines) == 100
+        assert len(lines) == 12
+        assert "100 mm" in "".join(text.text for text in page.iter(f"{SVG}text"))
+
+
 def test_a_piece_larger_than_the_page_shrinks_the_net():
     outline = np.array([[0.0, 0.0], [30.0, 0.0], [0.0, 40.0]])
     room = np.array([200.0, 300.0])

@@ -5,9 +5,10 @@ import io
 import json
 from dataclasses import asdict, dataclass, fields
 from math import ceil
+from typing import Any
 
 from drkid.export.colour import CONNECTOR_COLOUR, class_colour
-from drkid.kit import class_id
+from drkid.export.layout import part_label, picture_file
 from drkid.spec import KitSpec
 
 ROUNDING = 1e-9  # 5 % of 40 are 2 spares, whatever the last bit says
@@ -18,7 +19,9 @@ class Row:
     """A line of the parts list; what does not apply is None and an empty cell.
 
     `volume_mm3`, `mass_g`, `length` and `cost` are those of one part, in mm, g and the currency of the given price;
-    `total_…` of all of them, spares included: for rods `total_length` is the stock to buy.
+    `total_…` of all of them, spares included: for rods `total_length` is the stock to buy. `mould_cost` is what one
+    mould for the part costs, `moulded_cost` a moulded copy; the mould pays from `break_even_count` copies on, None
+    where a moulded copy costs no less. `picture` is written where the kit has documents.
     """
 
     part: str
@@ -34,16 +37,22 @@ class Row:
     total_length: float | None = None
     cost: float | None = None
     total_cost: float | None = None
+    mould_cost: float | None = None
+    moulded_cost: float | None = None
+    break_even_count: int | None = None
+    picture: str | None = None
 
 
 @dataclass(frozen=True)
 class Moulding:
-    """Printing a kit against moulding it, spares and rods apart, in the currency of the given prices.
+    """Printing a kit of so many `parts` against moulding it, in the currency of the given prices.
 
-    Moulds pay from `break_even_kits` kits on; None where a moulded kit costs no less than a printed one.
+    Spares and rods are left out. Moulds pay from `break_even_kits` kits on; None where a moulded kit costs no less
+    than a printed one.
     """
 
     moulds: int
+    parts: int
     moulds_cost: float
     printed_kit_cost: float
     moulded_kit_cost: float
@@ -59,7 +68,7 @@ def spare_count(spares: str, count: int) -> int:
 
 def piece_row(file: str, class_index: int, count: int, volume_mm3: float, spec: KitSpec) -> Row:
     """A printed piece."""
-    return _printed(f"piece {class_id(class_index)}", file, count, volume_mm3, class_colour(class_index), spec)
+    return _printed(f"piece {part_label(file)}", file, count, volume_mm3, class_colour(class_index), spec)
 
 
 def connector_row(name: str, file: str, count: int, volume_mm3: float, spec: KitSpec) -> Row:
@@ -83,7 +92,25 @@ def _printed(part: str, file: str, count: int, volume_mm3: float, colour: str, s
         total_mass_g=(count + spare) * mass,
         cost=cost,
         total_cost=None if cost is None else (count + spare) * cost,
+        picture=picture_file(file) if spec.documents else None,
+        **_moulded(cost, spec),
     )  # fmt: skip
+
+
+def _moulded(cost: float | None, spec: KitSpec) -> dict[str, Any]:
+    """The cells that compare a printed part of a cost with a moulded one; none where a price is not given."""
+    if cost is None or spec.mould_price is None:
+        return {}
+    return {
+        "mould_cost": spec.mould_price,
+        "moulded_cost": spec.moulded_price_per_piece,
+        "break_even_count": break_even(spec.mould_price, cost - spec.moulded_price_per_piece),
+    }
+
+
+def break_even(moulds_cost: float, saved: float) -> int | None:
+    """From how many copies on moulds pay, each of which saves so much; None where it saves nothing."""
+    return max(1, ceil(moulds_cost / saved - ROUNDING)) if saved > 0 else None
 
 
 def moulding(rows: list[Row], spec: KitSpec) -> Moulding | None:
@@ -95,9 +122,8 @@ def moulding(rows: list[Row], spec: KitSpec) -> Moulding | None:
     printed_kit = sum(row.count * cost for row, cost in zip(printed, costs, strict=True))
     moulded_kit = sum(row.count for row in printed) * spec.moulded_price_per_piece
     moulds_cost = len(printed) * spec.mould_price
-    saved = printed_kit - moulded_kit
-    kits = max(1, ceil(moulds_cost / saved - ROUNDING)) if saved > 0 else None
-    return Moulding(len(printed), moulds_cost, printed_kit, moulded_kit, kits)
+    kits = break_even(moulds_cost, printed_kit - moulded_kit)
+    return Moulding(len(printed), sum(row.count for row in printed), moulds_cost, printed_kit, moulded_kit, kits)
 
 
 def bom_csv(rows: list[Row]) -> str:

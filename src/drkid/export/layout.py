@@ -7,6 +7,7 @@ SURFACE = "surface.ply"
 SIMPLIFIED = "simplified.ply"
 ASSEMBLED = "assembled.ply"
 PARTS = "parts"
+PICTURES = "pictures"
 BOM_CSV = "bom.csv"
 BOM_JSON = "bom.json"
 PIECE_CLASS = "piece_class"  # face property of ASSEMBLED
@@ -29,6 +30,16 @@ def part_file(index: int, handedness: str, variant: int = 0) -> str:
 def connector_file(name: str) -> str:
     """File of a connector part."""
     return f"{PARTS}/{name}.stl"
+
+
+def part_label(file: str) -> str:
+    """What people call the part of a file: A, A2, A left, connector half."""
+    return file.rsplit("/", 1)[-1].removesuffix(".stl").replace("_", " ")
+
+
+def picture_file(file: str) -> str:
+    """Picture of the part of a file."""
+    return f"{PICTURES}/{file.rsplit('/', 1)[-1].removesuffix('.stl')}.png"
 
 
 def plate_file(number: int) -> str:

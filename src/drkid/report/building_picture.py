@@ -50,10 +50,18 @@ class Builder:
         return [self._polygons(i) for i in range(len(self.guide.scene.document.pieces))]
 
     @cached_property
+    def _faces(self) -> tuple[list[Floats], Ints, Floats]:
+        """The polygons of all pieces in world coordinates, whose they are, and their unit normals (n, 3)."""
+        polygons = [p for polygons in self._placed for p in polygons]
+        owner = np.repeat(np.arange(len(self._placed)), [len(polygons) for polygons in self._placed])
+        return polygons, owner, np.array([_normal(p) for p in polygons])
+
+    @cached_property
     def _fans(self) -> tuple[Floats, Ints, Bools]:
         """(n, 3, 3): every piece's triangles in world coordinates, whose they are, and which are of an outer face."""
-        corners, polygon = triangulated([p for polygons in self._placed for p in polygons])
-        piece = np.repeat(np.arange(len(self._placed)), [len(polygons) for polygons in self._placed])[polygon]
+        polygons, owner, _ = self._faces
+        corners, polygon = triangulated(polygons)
+        piece = owner[polygon]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         outwards = np.einsum("nk,nk->n", normal, self.guide.scene.transforms[piece][:, :3, 2])
         cosine = outwards / np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)
@@ -103,30 +111,41 @@ class Builder:
 
     # ---- drawing
 
+    def extents(self, group: tuple[Instruction, ...], view: Floats) -> Floats:
+        """(2,): width and height of what stands after the group's steps, as a camera sees it."""
+        low, high = self._box([one.piece for one in self.guide.instructions[: group[-1].step]], view)
+        return high - low
+
+    def _box(self, standing: list[int], view: Floats) -> tuple[Floats, Floats]:
+        corners, owner, _ = self._fans
+        flat = (corners[np.isin(owner, standing)].reshape(-1, 3) - self.guide.scene.middle) @ view[:2].T
+        return flat.min(axis=0), flat.max(axis=0)
+
     def drawing(self, group: tuple[Instruction, ...], view: Floats, width: float, height: float) -> Drawing:
         """What stands after the group's steps, `width` × `height` mm at most, new pieces coloured and numbered."""
         standing = [one.piece for one in self.guide.instructions[: group[-1].step]]
         new = {one.piece: one for one in group}
         asked = {join.other_step for one in group for join in one.joins}
-        flat = [(i, (p - self.guide.scene.middle) @ view.T) for i in standing for p in self._placed[i]]
-        flat = [(i, p) for i, p in flat if _signed_area(p) > 0]
-        found = painted([p for _, p in flat], SAMPLES)
-        owner = np.array([i for i, _ in flat])[found.source]
-        points = np.concatenate([p for _, p in flat])
-        low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+        polygons, owner, normals = self._faces
+        facing = np.flatnonzero(np.isin(owner, standing) & (normals @ view[2] > 0))
+        found = painted([(polygons[i] - self.guide.scene.middle) @ view.T for i in facing], SAMPLES)
+        source = facing[found.source]
+        low, high = self._box(standing, view)
         scale = min(width / (high - low)[0], height / (high - low)[1]) * 0.97
         size = (high - low) * scale
         sheet = np.array([size[0], size[1]]) * 1.02
         shift = sheet / 2 - (low + high) / 2 * scale
-        items = self._shapes(found, owner, set(new), scale, shift)
+        items = self._shapes(found, owner[source], _tones(normals[source] @ view.T), set(new), (scale, shift))
         words = self._words(standing, new, asked, view, (scale, shift))
         title = f"Steps {group[0].step} to {group[-1].step}: what stands, the new pieces coloured"
         return Drawing(float(sheet[0]), float(sheet[1]), (*items, *words), title)
 
-    def _shapes(self, found: Painted, owner: Ints, new: set[int], scale: float, shift: Floats) -> list[Shape]:
+    def _shapes(
+        self, found: Painted, owner: Ints, tones: Floats, new: set[int], placing: tuple[float, Floats]
+    ) -> list[Shape]:
         shapes: list[Shape] = []
-        for polygon, piece in zip(found.polygons, owner.tolist(), strict=True):
-            tone = _tone(polygon)
+        scale, shift = placing
+        for polygon, piece, tone in zip(found.polygons, owner.tolist(), tones.tolist(), strict=True):
             code = class_colour(int(self.guide.scene.piece_class[piece])) if piece in new else STANDING
             fill = _shaded(code, tone if piece not in new else 0.55 + 0.45 * tone)
             line = NEW_LINE if piece in new else STANDING_LINE
@@ -177,7 +196,7 @@ class Builder:
         size = float(np.clip(0.42 * radius, 1.6, 4.2))
         if instruction is None:
             return [Word(middle[0], middle[1], step, 0.85 * size, colour="#333333")]
-        letter = instruction.part.replace(" left", " L").replace(" right", " R")
+        letter = _short(instruction.part)
         return [
             *ticks(corners, self.guide.part_ticks[self.guide.scene.document.pieces[piece].part], 0.75 * size),
             Word(middle[0], middle[1] + 0.45 * size, step, size, True, "#000000", "#FFFFFF"),
@@ -194,7 +213,7 @@ class Builder:
         middle, size = flat.mean(axis=0), width / 6
         items = (
             Shape(flat, class_colour(number), NEW_LINE, 0.35),
-            Word(middle[0], middle[1], classes[number].id, size, True, "#000000", "#FFFFFF"),
+            Word(middle[0], middle[1], _short(self.guide.part_names[file]), size, True, "#000000", "#FFFFFF"),
             *ticks(flat, self.guide.part_ticks[file], width / 9),
         )
         name = self.guide.part_names[file]
@@ -215,6 +234,11 @@ def ticks(corners: Floats, counts: tuple[int, ...], length: float) -> list[Shape
     return found
 
 
+def _short(name: str) -> str:
+    """A part's name as pictures have room for it."""
+    return name.replace(" left", " L").replace(" right", " R")
+
+
 def _towards(normal: Floats) -> list[tuple[float, float]]:
     """Azimuth and elevation from which a normal is seen, not quite from above or below; none where it is zero."""
     length = float(np.linalg.norm(normal))
@@ -230,17 +254,16 @@ def _seen_faces(flat: Floats, size: int) -> Ints:
     return faces[faces >= 0]
 
 
-def _signed_area(polygon: Floats) -> float:
-    """Of a polygon in view coordinates: positive where it looks at the viewer."""
-    x, y = polygon[:, 0], polygon[:, 1]
-    return float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2)
+def _normal(polygon: Floats) -> Floats:
+    """(3,): the unit normal of a flat polygon (Newell)."""
+    spokes = polygon[1:] - polygon[0]
+    normal = np.cross(spokes[:-1], spokes[1:]).sum(axis=0)
+    return normal / max(float(np.linalg.norm(normal)), np.finfo(float).tiny)
 
 
-def _tone(polygon: Floats) -> float:
-    """Brightness in [0.45, 1] by how a polygon looks at the light, which comes from the left above the viewer."""
-    normal = np.cross(polygon, np.roll(polygon, -1, axis=0)).sum(axis=0)
-    normal = normal / max(float(np.linalg.norm(normal)), 1e-12)
-    return float(0.45 + 0.55 * max(0.0, normal @ np.array([-0.35, 0.5, 0.79])))
+def _tones(normals: Floats) -> Floats:
+    """(n,): brightness in [0.45, 1] of faces with normals in view coordinates; the light is left above the viewer."""
+    return np.asarray(0.45 + 0.55 * np.maximum(0.0, normals @ np.array([-0.35, 0.5, 0.79])), np.float64)
 
 
 def _shaded(code: str, tone: float) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from drkid.export.coupon import coupon_files
 from drkid.export.kit_document import parts_list, printed_meshes
-from drkid.export.layout import GUIDE_HTML, GUIDE_PDF, REPORT
+from drkid.export.layout import GUIDE_HTML, GUIDE_PDF, REPORT, picture_file
 from drkid.export.plates import plate_files
 from drkid.kit import Kit
 from drkid.progress import Progress, silent
@@ -31,7 +31,8 @@ def _report(kit: Kit) -> dict[str, bytes]:
     meshes = printed_meshes(kit)
     rows = parts_list(kit, meshes)
     pictures = {row.file: part_picture(meshes[row.file], row.colour) for row in rows if row.file and row.colour}
-    return {REPORT: report_html(scene_of(kit), rows, pictures).encode()}
+    page = report_html(scene_of(kit), kit.spec, rows, {file: small for file, (_, small) in pictures.items()})
+    return {REPORT: page.encode(), **{picture_file(file): large for file, (large, _) in pictures.items()}}
 
 
 _MAKERS: tuple[tuple[str, Callable[[Kit], dict[str, bytes]]], ...] = (

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from drkid.export.layout import part_label
 from drkid.mesh import Floats
 from drkid.report.scene import Scene
 
@@ -57,13 +58,8 @@ class Guide:
 
     @cached_property
     def part_names(self) -> dict[str, str]:
-        """What each part is called: its class's letter, and its hand where mirror images differ."""
-        classes = self.scene.document.classes
-        return {
-            part.file: one.id if part.handedness == "any" else f"{one.id} {part.handedness}"
-            for one in classes
-            for part in one.parts
-        }
+        """What each part is called: its class's letter, its bevel's number and its hand where these differ."""
+        return {part.file: part_label(part.file) for one in self.scene.document.classes for part in one.parts}
 
     @cached_property
     def instructions(self) -> tuple[Instruction, ...]:

@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from drkid.mesh import Floats
 from drkid.report.building_picture import Builder
 from drkid.report.drawing import Drawing
 from drkid.report.guide import Guide, Instruction, closing_text, joining_text
@@ -48,13 +51,25 @@ def guide_pages(guide: Guide) -> tuple[list[Page], Page]:
 
 
 def _page(builder: Builder, group: tuple[Instruction, ...]) -> Page:
-    """One large picture, or a few smaller ones where no direction shows all new pieces."""
+    """One large picture, or a few smaller ones where no direction shows all new pieces: as large as they can be."""
     views = builder.views(group)
+    shapes = [builder.extents(group, view) for view in views]
+    columns = max((1, 2), key=lambda columns: _scale(shapes, columns))
+    return Page(group, tuple(builder.drawing(group, view, *_room(len(views), columns)) for view in views))
+
+
+def _room(pictures: int, columns: int) -> tuple[float, float]:
+    """Width and height in mm for each of so many pictures."""
+    columns = min(columns, pictures)
+    rows = -(-pictures // columns)
     width, height = SHEET_MM
-    columns = 1 if len(views) == 1 else 2
-    rows = -(-len(views) // columns)
-    size = (width - GAP_MM * (columns - 1)) / columns, (height - GAP_MM * (rows - 1)) / rows
-    return Page(group, tuple(builder.drawing(group, view, *size) for view in views))
+    return (width - GAP_MM * (columns - 1)) / columns, (height - GAP_MM * (rows - 1)) / rows
+
+
+def _scale(shapes: list[Floats], columns: int) -> float:
+    """Sum of the scales at which pictures of such extents fill their rooms."""
+    room = np.array(_room(len(shapes), columns))
+    return sum(float((room / shape).min()) for shape in shapes)
 
 
 def part_lines(guide: Guide) -> list[PartLine]:

@@ -25,7 +25,9 @@ PAPERS: dict[Paper, tuple[float, float]] = {
 """Width and height in mm."""
 
 MARGIN_MM = 10.0  # what printers cannot print on
-HEADING_MM = 6.0  # under the top margin: title, scale and page number
+HEADING_MM = 6.0  # under the top margin: title, scale, page number and ruler
+RULER_MM = 100.0  # to see that the printer has not scaled the page
+MOST_TEXT = 0.55  # of a mean side: letters of a piece's number times their height, so that it keeps off cuts' numbers
 TAB_MM = 6.0
 TAB_SHARE = 0.22  # of the side, where that is less
 GAP_MM = 2.0
@@ -211,7 +213,9 @@ def _drawn(kit: Kit, strip: Strip, tabs: tuple[Floats, ...], joints: list[Fold],
         index = kit.part_set.parts[piece.part].class_index
         step = steps.get(piece.face, number + 1)
         faces.append(Face(number, step, index, outline))
-        labels.append(Label(f"{class_id(index)} {step}", outline.mean(axis=0), _label_height(outline)))
+        text = f"{class_id(index)} {step}"
+        height = min(_label_height(outline), MOST_TEXT * _mean_side(outline) / len(text))
+        labels.append(Label(text, outline.mean(axis=0), height))
     lines: list[Line] = []
     folds = set(strip.folds)
     for joint_number, joint in enumerate(joints):
@@ -234,8 +238,12 @@ def _fold_kind(bend_degrees: float) -> str:
     return "mountain" if bend_degrees > 0 else "valley"
 
 
+def _mean_side(outline: Floats) -> float:
+    return float(np.linalg.norm(np.roll(outline, -1, axis=0) - outline, axis=1).mean())
+
+
 def _label_height(outline: Floats) -> float:
-    return 0.13 * float(np.linalg.norm(np.roll(outline, -1, axis=0) - outline, axis=1).mean())
+    return 0.13 * _mean_side(outline)
 
 
 def _number(text: str, start: Floats, end: Floats, outline: Floats) -> Label:
@@ -258,8 +266,18 @@ def _heading(net: Net, page: int) -> str:
     scale = "full size" if abs(net.scale - 1) < 1e-9 else f"scale {net.scale:.3g}"
     return (
         f"Page {page} of {len(net.pages)}, {scale}. Cut solid lines; fold dashes back (mountain), dash-dots forward "
-        "(valley); glue equal numbers."
+        f"(valley); glue equal numbers. The ruler is {RULER_MM:g} mm."
     )
+
+
+def _ruler(net: Net) -> list[tuple[Floats, Floats]]:
+    """Lines of a ruler with a tick each centimetre, under the heading."""
+    left, foot = net.size_mm[0] / 2 - RULER_MM / 2, net.size_mm[1] - MARGIN_MM - HEADING_MM + 0.5
+    ticks = [(left + 10 * k, 2.0 if k in {0, RULER_MM / 10} else 1.0) for k in range(int(RULER_MM / 10) + 1)]
+    return [
+        (np.array([left, foot]), np.array([left + RULER_MM, foot])),
+        *((np.array([x, foot]), np.array([x, foot + tall])) for x, tall in ticks),
+    ]
 
 
 def net_svg(net: Net) -> bytes:
@@ -290,7 +308,9 @@ def _svg_page(net: Net, number: int, page: Page) -> Iterator[str]:
 
     yield f'<g transform="translate({width * number:g} 0)">'
     yield f'<rect class="page" width="{width:g}" height="{height:g}"/>'
-    yield f'<text x="{width / 2:g}" y="{MARGIN_MM + 2:g}" font-size="3">{escape(_heading(net, number + 1))}</text>'
+    yield f'<text x="{width / 2:g}" y="{MARGIN_MM + 1:g}" font-size="3">{escape(_heading(net, number + 1))}</text>'
+    for (x1, y1), (x2, y2) in _ruler(net):
+        yield f'<line class="cut" x1="{x1:g}" y1="{height - y1:g}" x2="{x2:g}" y2="{height - y2:g}"/>'
     for tab in page.tabs:
         yield f'<polygon class="tab" points="{" ".join(map(point, tab))}"/>'
     for face in page.faces:
@@ -322,7 +342,10 @@ def net_pdf(net: Net) -> bytes:
     for number, page in enumerate(net.pages, 1):
         canvas.scale(MM, MM)
         canvas.setFont("Helvetica", 3)
-        canvas.drawCentredString(width / 2, height - MARGIN_MM - 3, _heading(net, number))
+        canvas.drawCentredString(width / 2, height - MARGIN_MM - 2, _heading(net, number))
+        canvas.setLineWidth(WIDTHS["cut"])
+        for start, end in _ruler(net):
+            canvas.line(*start.tolist(), *end.tolist())
         _pdf_page(canvas, page)
         canvas.showPage()
     canvas.save()

@@ -38,7 +38,7 @@ def lines(x: Floats, series: dict[str, Floats], labels: tuple[str, str], limit: 
     if limit is not None:
         y = float(down(np.array(limit[1])))
         parts.append(f'<path class="axis" stroke-dasharray="2 4" d="M{LEFT} {y:.1f}H{WIDTH - RIGHT}"/>')
-        parts.append(f'<text x="{LEFT + 6}" y="{y - 5:.1f}">{escape(limit[0])}</text>')
+        parts.append(f'<text class="on" x="{LEFT + 6}" y="{y - 5:.1f}">{escape(limit[0])}</text>')
     ends = [(float(x[0]), "start"), (float(x[-1]), "end")]
     parts += [
         f'<text x="{across(np.array(v)):.1f}" y="{HEIGHT - BOTTOM + 16}" text-anchor="{anchor}">{v:g}</text>'
@@ -60,7 +60,9 @@ def bars(values: Floats, colours: Sequence[str], names: Sequence[str], labels: t
         )
     mean = TOP + high * (1 - float(values.mean()) / top)
     parts.append(f'<path class="axis" stroke-dasharray="6 3" d="M{LEFT} {mean:.2f}H{WIDTH - RIGHT}"/>')
-    parts.append(f'<text x="{WIDTH - RIGHT}" y="{mean - 4:.2f}" text-anchor="end">mean {values.mean():.3g}</text>')
+    parts.append(
+        f'<text class="on" x="{WIDTH - RIGHT}" y="{mean - 4:.2f}" text-anchor="end">mean {values.mean():.3g}</text>'
+    )
     parts.append(f'<text x="{LEFT}" y="{HEIGHT - BOTTOM + 16}">1</text>')
     parts.append(f'<text x="{WIDTH - RIGHT}" y="{HEIGHT - BOTTOM + 16}" text-anchor="end">{len(values)}</text>')
     return _framed(parts, labels)

@@ -11,24 +11,26 @@ from typing import Any
 
 import numpy as np
 
-from drkid.export.bill_of_materials import Row
+from drkid.export.bill_of_materials import Row, moulding
 from drkid.export.colour import class_colour
 from drkid.mesh import Floats, TriMesh
 from drkid.report import plot
 from drkid.report.colouring import RAMP, UNITS
 from drkid.report.decimation import clustered
 from drkid.report.kit_picture import view_named
+from drkid.report.parts_list import moulding_section, parts_table
 from drkid.report.scene import Scene
-from drkid.report.tables import classes_table, metrics_table, paper_table, parts_table
+from drkid.report.tables import classes_table, metrics_table, paper_table, summary_table
+from drkid.spec import KitSpec
 
 GHOST_FACES = 8000  # of M_i in the page
 MATRIX_DIGITS = 6  # after the point, of mm and of direction cosines: far below a pixel
 
 
-def report_html(scene: Scene, parts_list: list[Row], pictures: Mapping[str, bytes]) -> str:
+def report_html(scene: Scene, spec: KitSpec, rows: list[Row], pictures: Mapping[str, bytes]) -> str:
     """The page, self-contained: data, styles, scripts and the licence of three.js are in it.
 
-    `pictures` are those of the parts, PNG by the part's file.
+    `rows` are the parts list, `pictures` those of the parts, PNG by the part's file.
     """
     document = scene.document
     metrics, pieces = document.metrics, len(document.pieces)
@@ -48,7 +50,9 @@ def report_html(scene: Scene, parts_list: list[Row], pictures: Mapping[str, byte
         data=json_in_html(_data(scene)),
         pieces=str(pieces),
         classes=classes_table(document),
-        parts=parts_table(parts_list, pictures),
+        short=summary_table(document),
+        parts=parts_table(rows, pictures, spec),
+        moulding=moulding_section(moulding(rows, spec), rows, spec),
         histogram=_histogram(scene),
         convergence=_convergence(scene),
         table=paper_table(document),
@@ -118,8 +122,9 @@ def _pieces(scene: Scene, part_number: dict[str, int], figures: dict[str, Floats
 
 
 def _packed(mesh: TriMesh) -> dict[str, str]:
-    """Vertices as base64 of float32, corners of faces as base64 of uint32."""
-    arrays = {"vertices": mesh.vertices.astype("<f4"), "faces": mesh.faces.astype("<u4")}
+    """Vertices as base64 of float32, corners of faces as base64 of uint16, or of uint32 where these are too few."""
+    index = "<u2" if len(mesh.vertices) < 2**16 else "<u4"
+    arrays = {"vertices": mesh.vertices.astype("<f4"), "faces": mesh.faces.astype(index)}
     return {name: base64.b64encode(array.tobytes()).decode("ascii") for name, array in arrays.items()}
 
 

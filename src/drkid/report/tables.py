@@ -1,24 +1,30 @@
 """Tables of the report as HTML; every text is escaped."""
 
-import base64
 import tomllib
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Sequence
 from html import escape
 from importlib.resources import files
 from typing import Any
 
-from drkid.export.bill_of_materials import Row
 from drkid.export.colour import class_colour
 from drkid.export.document import DistanceDocument, KitDocument
 
 PAPER_COLUMNS = ("", "pieces", "classes", "largest error %", "mean error %", "d(Mi, Ms) %", "d(Ms, Mf) %",
                  "d(Mi, Mf) %", "seconds", "iterations")  # fmt: skip
+EXACT_PERCENT = 1e-6  # an error below is rounding
+LEAST_GAP_MM = 1e-3  # a gap below is none
+NUMERIC = ' class="n"'
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[object]], own: int | None = None) -> str:
-    """A table; cells that are numbers stand to the right, cells of `Html` are put in as they are."""
-    top = "".join(f'<th scope="col">{escape(h)}</th>' for h in head)
+    """A table; cells that are numbers stand to the right, cells of `Html` are put in as they are.
+
+    `own` is the row that is marked.
+    """
+    figures = [any(_is_figure(row[i]) for row in rows) for i in range(len(head))]
+    top = "".join(
+        f'<th scope="col"{NUMERIC if figure else ""}>{escape(h)}</th>' for h, figure in zip(head, figures, strict=True)
+    )
     kinds = [' class="own"' if i == own else "" for i in range(len(rows))]
     lines = [f"<tr{kind}>{''.join(map(_cell, row))}</tr>" for kind, row in zip(kinds, rows, strict=True)]
     return f"<table><thead><tr>{top}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
@@ -30,11 +36,23 @@ class Html(str):
     __slots__ = ()
 
 
+class Figure(str):
+    """A number that is text already."""
+
+    __slots__ = ()
+
+
+def _is_figure(value: object) -> bool:
+    return isinstance(value, float | int | Figure) and not isinstance(value, bool)
+
+
 def _cell(value: object) -> str:
     if isinstance(value, Html):
         return f"<td>{value}</td>"
-    if isinstance(value, float | int):
-        return f'<td class="n">{number(value)}</td>'
+    if isinstance(value, bool):
+        return f"<td>{'yes' if value else 'no'}</td>"
+    if _is_figure(value):
+        return f"<td{NUMERIC}>{number(value) if isinstance(value, float | int) else value}</td>"
     return f"<td>{escape('' if value is None else str(value))}</td>"
 
 
@@ -65,26 +83,6 @@ def classes_table(document: KitDocument) -> str:
     return table(("class", "pieces", "files", "sides in mm", "mirror image"), rows)
 
 
-def parts_table(rows: Sequence[Row], pictures: Mapping[str, bytes]) -> str:
-    """The parts list, with those columns that say something and the pictures of the parts, PNG by file."""
-    plain = [asdict(row) for row in rows]
-    names = [name for name in plain[0] if any(row[name] not in (None, "") for row in plain)] if plain else []
-    cells = [[_pictured(row, pictures), *(_coloured(name, row[name]) for name in names)] for row in plain]
-    return table(["", *(name.replace("_", " ").replace("mm3", "mm³") for name in names)], cells)
-
-
-def _pictured(row: dict[str, Any], pictures: Mapping[str, bytes]) -> Html:
-    picture = pictures.get(row["file"])
-    if picture is None:
-        return Html("")
-    data = base64.b64encode(picture).decode("ascii")
-    return Html(f'<img src="data:image/png;base64,{data}" alt="{escape(row["part"])} from inside" height="72">')
-
-
-def _coloured(name: str, value: Any) -> object:
-    return Html(swatch(value) + escape(value)) if name == "colour" and isinstance(value, str) else value
-
-
 def paper_table(document: KitDocument) -> str:
     """This kit's row, then the paper's table."""
     metrics, distances = document.metrics, document.metrics.hausdorff
@@ -109,6 +107,40 @@ def _pair(distance: DistanceDocument) -> str:
     return f"{distance.mean_percent:.3g} / {distance.max_percent:.3g}"
 
 
+def summary_table(document: KitDocument) -> str:
+    """What the kit is and how good it is, in words."""
+    metrics, found = document.metrics, document.metrics.assembly
+    near, bends, groove = metrics.hausdorff.surface_assembled, metrics.dihedral, metrics.groove
+    connectors = metrics.unique_connector_parts
+    rows = {
+        "pieces": f"{metrics.pieces} in {_many(metrics.classes, 'class', 'es')}, "
+        f"{_many(metrics.unique_piece_parts, 'mould')}" + (f" and {connectors} of connectors" if connectors else ""),
+        "error of a piece": ("exact: " if metrics.error_max_percent < EXACT_PERCENT else "")
+        + f"{metrics.error_max_percent:.2g} % of the mean edge at most, {metrics.error_mean_percent:.2g} % in the mean",
+        "distance to the surface": f"{near.mean_percent:.2g} % mean, {near.max_percent:.2g} % at most, of its box's "
+        "diagonal",
+        "bends at joints": f"{bends.mean_degrees:.1f}° mean, 95 of 100 below {bends.p95_degrees:.1f}°; "
+        f"{bends.concave_percent:.0f} % are concave",
+        "grooves": f"{groove.mean_mm:.2g} mm mean, {groove.max_mm:.2g} mm at most",
+        "edges": f"{metrics.mean_edge:.1f} mm in the mean; pieces {document.spec['thickness_mm']:g} mm thick",
+    }
+    if metrics.rigidity is not None:
+        stiff = metrics.rigidity
+        rows["rigidity"] = f"{stiff.firmness}: {stiff.stiffness_percent:.2g} % of a round shell's stiffness"
+    if found is not None:
+        gap = found.closure.gaps.max_mm
+        rows["assembly"] = (
+            f"{found.closure.verdict}: gaps of {gap if gap > LEAST_GAP_MM else 0:.2g} mm at most, with "
+            f"{found.closure.play_mm:.2g} mm of play; "
+            + ("the last piece goes in" if found.building.last_goes_in else "no piece goes in last")
+        )
+    return table(("what", "how it is"), list(rows.items()))
+
+
+def _many(count: int, word: str, ending: str = "s") -> str:
+    return f"{count} {word}{ending if count != 1 else ''}"
+
+
 def metrics_table(document: KitDocument) -> str:
     """Every figure of kit.json, with its name there."""
     plain = document.metrics.model_dump(mode="json", exclude_none=True)
@@ -116,7 +148,11 @@ def metrics_table(document: KitDocument) -> str:
 
 
 def _flat(path: str, value: Any) -> list[tuple[str, object]]:
-    if not isinstance(value, dict):
-        return [(path, value)]
-    inner = value.items()
-    return [row for name, one in inner for row in _flat(f"{path} {name}".strip().replace("_", " "), one)]
+    """A row for each figure within; lists of figures stand in one row, lists of objects are numbered."""
+    if isinstance(value, dict):
+        named = list(value.items())
+    elif isinstance(value, list) and any(isinstance(one, dict) for one in value):
+        named = [(str(number), one) for number, one in enumerate(value, 1)]
+    else:
+        return [(path, ", ".join(map(str, value)) if isinstance(value, list) else value)]
+    return [row for name, one in named for row in _flat(f"{path} {name}".strip().replace("_", " "), one)]

@@ -8,7 +8,7 @@
 
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
   const floats = (text) => new Float32Array(bytes(text));
-  const indices = (text) => new Uint32Array(bytes(text));
+  const indices = (mesh) => floats(mesh.vertices).length / 3 < 65536 ? new Uint16Array(bytes(mesh.faces)) : new Uint32Array(bytes(mesh.faces));
   const shown = (x) => (x === 0 ? "0" : Math.abs(x) < 1e-6 ? "< 0.000001" : Number(x.toPrecision(3)).toString());
 
   let renderer = null;
@@ -62,7 +62,7 @@
     kit.parts.forEach((part, number) => {
       const shared = new T.BufferGeometry();
       shared.setAttribute("position", new T.BufferAttribute(floats(part.vertices), 3));
-      shared.setIndex(new T.BufferAttribute(indices(part.faces), 1));
+      shared.setIndex(new T.BufferAttribute(indices(part), 1));
       const geometry = shared.toNonIndexed(); // each face has its own normal
       geometry.computeVertexNormals();
       const own = kit.pieces.map((_, i) => i).filter((i) => kit.pieces[i].part === number);
@@ -75,7 +75,7 @@
     });
     const surface = new T.BufferGeometry();
     surface.setAttribute("position", new T.BufferAttribute(floats(kit.surface.vertices), 3));
-    surface.setIndex(new T.BufferAttribute(indices(kit.surface.faces), 1));
+    surface.setIndex(new T.BufferAttribute(indices(kit.surface), 1));
     surface.computeVertexNormals();
     ghost = new T.Mesh(surface, new T.MeshLambertMaterial({ color: 0x6f8fd0, transparent: true, opacity: 0.4, depthWrite: false, side: T.DoubleSide }));
     ghost.visible = false;
@@ -175,7 +175,6 @@
     clearInterval(playing);
     playing = 0;
     at("play").textContent = on ? "Pause" : "Play";
-    at("play").setAttribute("aria-pressed", String(on));
     if (!on) return;
     if (Number(at("step").value) >= kit.pieces.length) toStep(1);
     playing = setInterval(() => {
