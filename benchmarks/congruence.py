@@ -7,6 +7,7 @@ process of its own, so that its peak memory is its own. Prints tables and writes
 
     python benchmarks/congruence.py            the standard table, about 40 minutes on two cores
     python benchmarks/congruence.py --full     every shape at every size
+    python benchmarks/congruence.py --resume   goes on with the rows that are not in the results yet
     python benchmarks/congruence.py --faces 172 --palettes 2,universal --seeds 0 --shapes golgi_vesicle.mrc
 """
 
@@ -96,7 +97,7 @@ def standard(full: bool) -> list[Run]:
         runs += rows(few, faces, (2, 3, 4, 10))
     for faces in (2000, 5000):
         runs += rows(few if full else FEW[:1], faces, (4, 10))
-    return runs
+    return sorted(runs, key=lambda run: run.faces == 500 and run.shape != FEW[0])  # the longest last
 
 
 def measured(run: Run, *, beside: bool) -> dict:
@@ -113,6 +114,7 @@ def measured(run: Run, *, beside: bool) -> dict:
         "shape": run.shape,
         "palette": run.palette or "universal",
         "seed": run.seed,
+        "asked_faces": run.faces,
         "peak_memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
         "curve": curve,
         **figures(surface.mesh, simplified, found),
@@ -247,6 +249,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=names, default=[0])
     parser.add_argument("--seconds", type=float)
     parser.add_argument("--shapes", type=lambda text: text.split(","), default=list(SHAPES))
+    parser.add_argument("--resume", action="store_true")
     parser.add_argument("--out", type=Path, default=HERE / "results" / "congruence.json")
     options = parser.parse_args()
     require_data()
@@ -259,17 +262,20 @@ def main() -> None:
             for k in options.palettes
             for seed in options.seeds
         ]
+    options.out.parent.mkdir(exist_ok=True)
+    rows = json.loads(options.out.read_text()) if options.resume and options.out.exists() else []
+    done = {(r["shape"], r["asked_faces"], r["palette"], r["seed"]) for r in rows}
     print(HEAD)
-    rows = []
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(1, mp_context=spawn, max_tasks_per_child=1) as pool:
         for run in runs:
+            if (run.shape, run.faces, run.palette or "universal", run.seed) in done:
+                continue
             rows.append(pool.submit(measured, run, beside=run.seed == 0).result())
             print(line(rows[-1]), flush=True)
+            options.out.write_text(json.dumps(rows, indent=1) + "\n")
     summary(rows)
     paper()
-    options.out.parent.mkdir(exist_ok=True)
-    options.out.write_text(json.dumps(rows, indent=1) + "\n")
 
 
 if __name__ == "__main__":
