@@ -31,9 +31,14 @@ def printed_lengths(lengths: Floats, scale: float) -> Floats:
     return np.round(lengths * scale, DECIMALS)
 
 
+def following(corners: Floats) -> Floats:
+    """The next corner at each of corners (…, n, 2) around a polygon; `np.roll`, but much faster for so few."""
+    return np.concatenate([corners[..., 1:, :], corners[..., :1, :]], axis=-2)
+
+
 def inward_normals(corners: Floats) -> Floats:
     """Unit normals (…, 3, 2) of the sides of counter-clockwise triangles (…, 3, 2), pointing inwards."""
-    along = np.roll(corners, -1, axis=-2) - corners
+    along = following(corners) - corners
     normals = np.stack([-along[..., 1], along[..., 0]], axis=-1)
     return normals / np.linalg.norm(normals, axis=-1, keepdims=True)
 

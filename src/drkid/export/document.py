@@ -231,7 +231,7 @@ class OverlapDocument(Model):
     pairs: int = Field(ge=0, description="at their places")
     largest_mm3: float = Field(ge=0)
     largest_percent: float = Field(ge=0, description="of the smaller piece")
-    faces: tuple[int, int] | None = Field(description="of the pair with the largest share")
+    faces: tuple[int, int] | None = Field(default=None, description="of the pair with the largest share")
     swing_degrees: float
     swung: int = Field(ge=0, description="more pairs, when one piece turns by swing_degrees about one of its hinges")
 

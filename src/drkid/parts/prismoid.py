@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from drkid.class_triangle import inward_normals
+from drkid.class_triangle import following, inward_normals
 from drkid.mesh import Floats, read_only
 from drkid.solid import Solid
 
@@ -80,7 +80,7 @@ class Prismoid:
 
 def cut_corners(outline: Floats, depths_mm: Floats) -> Floats:
     """(3, 2, 2): both ends of the cuts that lie `depths_mm` (3,) behind the corners of an outline (3, 2)."""
-    ways = np.stack([np.roll(outline, 1, axis=0), np.roll(outline, -1, axis=0)], axis=1) - outline[:, None]
+    ways = np.stack([np.roll(outline, 1, axis=0), following(outline)], axis=1) - outline[:, None]
     ways /= np.linalg.norm(ways, axis=2, keepdims=True)
     bisector = ways.sum(axis=1, keepdims=True)
     along = (ways * bisector / np.linalg.norm(bisector, axis=2, keepdims=True)).sum(axis=2, keepdims=True)
@@ -89,7 +89,7 @@ def cut_corners(outline: Floats, depths_mm: Floats) -> Floats:
 
 def side_insets(triangle: Floats, outline: Floats) -> Floats:
     """(3,): how far each side of an outline (3, 2) stands inside a triangle's (3, 2), at the nearer end."""
-    offset = np.stack([outline, np.roll(outline, -1, axis=0)]) - triangle
+    offset = np.stack([outline, following(outline)]) - triangle
     return np.einsum("esk,sk->es", offset, inward_normals(triangle)).min(axis=0)
 
 

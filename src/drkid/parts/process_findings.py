@@ -8,6 +8,7 @@ from drkid.kit import Dimensions, Finding
 from drkid.mesh import Floats
 from drkid.parts.bevel_variants import Moulds
 from drkid.parts.fit import margins
+from drkid.parts.pocket import deepest_height_mm, depth_mm
 from drkid.parts.prismoid import Prismoid
 from drkid.spec import KitSpec
 
@@ -90,6 +91,7 @@ def _process(d: Dimensions, spec: KitSpec) -> Iterator[Finding]:
         remedy = "hold the hinges with --retention glue"
         for subject, what in (("all pieces", "undercut of the detent's grooves"), ("connector", "height of its bumps")):
             yield Finding(subject, what, preset.max_undercut_mm, d.detent_mm, "mm", "at most", remedy)
+    yield from _moulded(d, spec)
     if d.rod_diameter_mm:
         bore = d.rod_diameter_mm + 2 * d.rod_clearance_mm
         yield Finding("connector", "bore", preset.min_hole_mm, bore, "mm", "at least", "a thicker --rod-diameter-mm")
@@ -99,6 +101,32 @@ def _process(d: Dimensions, spec: KitSpec) -> Iterator[Finding]:
         yield Finding(
             "marks", "depth", d.thickness_mm - d.min_wall_mm, depth, "mm", "at most", "a lesser --mark-depth-mm"
         )
+
+
+def _moulded(d: Dimensions, spec: KitSpec) -> Iterator[Finding]:
+    """What has no draft or hides from a mould that opens along a piece's normal, and along a connector's."""
+    preset = spec.preset
+    if preset.max_undercut_mm is not None and d.key_bend_degrees:
+        hidden = depth_mm(d, deepest_height_mm(d)) - depth_mm(d, -d.thickness_mm / 2)
+        remedy = "slide the pockets' cores along their lean, or take --connector hinge"
+        yield Finding(
+            "all pieces",
+            "undercut of leaning pockets",
+            preset.max_undercut_mm,
+            max(hidden, 0.0),
+            "mm",
+            "at most",
+            remedy,
+        )
+    if not preset.draft_degrees:
+        return
+    upright: list[tuple[str, str, str]] = []
+    if spec.marks and _mark_depth(spec):
+        upright.append(("marks", "draft of their walls", "engrave the mould with a conical cutter, or --no-marks"))
+    if d.connector != "none":
+        upright.append(("connector", "draft of its ends", "its ends are upright in the mould: draft them there"))
+    for subject, what, remedy in upright:
+        yield Finding(subject, what, preset.draft_degrees, 0.0, "degrees", "at least", remedy)
 
 
 def _mark_depth(spec: KitSpec) -> float:
