@@ -6,8 +6,11 @@ its security radius; Liu et al., "On centroidal Voronoi tessellation: energy smo
 2009), for the gradient and the quasi-Newton iterations.
 """
 
+import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +24,9 @@ from drkid.mesh import Floats, Ints, TriMesh
 
 NEIGHBOURS = 24  # of a seed, by which cells are clipped at first; doubled where the security radius asks for more
 CORNERS = 64  # most corners of a clipped triangle: three and one more for each bisector that cuts it
+CHUNK = 20_000  # triangles, about, that one thread clips at a time: sums depend on it, not on the number of threads
 MEMORY = 7  # corrections that L-BFGS keeps; the usual choice
+Part = tuple[Floats, Ints, bool]  # cells, dual triangles, and whether lists of neighbours were long enough
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +48,7 @@ class Tessellation:
 # The kernels take whole arrays and indices: a view of a row costs more than the few sums that are made with it.
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _reach(polygons: Floats, here: int, count: int, sites: Floats, i: int) -> float:
     # Squared distance from the seed to the farthest corner.
     most = 0.0
@@ -55,7 +60,7 @@ def _reach(polygons: Floats, here: int, count: int, sites: Floats, i: int) -> fl
     return most
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _bisector(sites: Floats, i: int, j: int) -> tuple[float, float, float, float]:
     # The half-space nearer to seed i than to j: x p + y q + z r ≥ offset.
     x, y, z = sites[i, 0] - sites[j, 0], sites[i, 1] - sites[j, 1], sites[i, 2] - sites[j, 2]
@@ -63,7 +68,7 @@ def _bisector(sites: Floats, i: int, j: int) -> tuple[float, float, float, float
     return x, y, z, double / 2
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _cut(
     polygons: Floats,
     sides: Ints,
@@ -99,7 +104,7 @@ def _cut(
     return kept
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _clip(
     i: int, sites: Floats, near: Ints, apart: Floats, polygons: Floats, sides: Ints, left: Floats
 ) -> tuple[int, int]:
@@ -122,7 +127,7 @@ def _clip(
     return (count if near.shape[1] == len(sites) - 1 else -1), here
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _add_corner(triangles: Ints, found: int, i: int, j: int, k: int) -> int:
     # Three cells meet: each of them sees this corner, the first of them keeps it.
     if i < j and i < k and j != k and found < len(triangles):
@@ -131,7 +136,7 @@ def _add_corner(triangles: Ints, found: int, i: int, j: int, k: int) -> int:
     return found
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _integrate(polygons: Floats, here: int, count: int, sites: Floats, i: int, cells: Floats) -> None:
     # Adds area, energy and moment to cells[i]. Exact for the fan of triangles: the second moment of one about the seed
     # is A (Σ |p|² + |Σ p|²) / 12.
@@ -153,13 +158,13 @@ def _integrate(polygons: Floats, here: int, count: int, sites: Floats, i: int, c
         cells[i, 4] += area * (r + sz / 3)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _squared_distance(points: Floats, i: int, sites: Floats, j: int) -> float:
     x, y, z = points[i, 0] - sites[j, 0], points[i, 1] - sites[j, 1], points[i, 2] - sites[j, 2]
     return x * x + y * y + z * z
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _nearer(middles: Floats, f: int, sites: Floats, near: Ints, apart: Floats, g: int) -> tuple[int, bool]:
     # The nearest among seed g and its neighbours, and whether no other seed can be nearer: one that is lies within
     # twice g's distance of g.
@@ -174,10 +179,13 @@ def _nearer(middles: Floats, f: int, sites: Floats, near: Ints, apart: Floats, g
     return best, near.shape[1] == len(sites) - 1
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _nearest(middles: Floats, sites: Floats, near: Ints, apart: Floats, first: Ints) -> bool:
-    # The seed nearest to each point, where `first` is a guess, in place. False where lists of neighbours are too short.
+    # The seed nearest to each point, where `first` is a guess, in place; where that is negative, the seed of the point
+    # before is the guess. False where lists of neighbours are too short.
     for f in range(len(middles)):
+        if first[f] < 0:
+            first[f] = first[f - 1] if f else 0
         sure = False
         while not sure:
             best, sure = _nearer(middles, f, sites, near, apart, first[f])
@@ -187,7 +195,7 @@ def _nearest(middles: Floats, sites: Floats, near: Ints, apart: Floats, first: I
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _restricted_voronoi(
     corners: Floats, first: Ints, sites: Floats, near: Ints, apart: Floats
 ) -> tuple[Floats, Ints, bool]:
@@ -233,26 +241,30 @@ def is_compiled() -> bool:
     return any(index.stat().st_mtime >= source for index in kept)
 
 
-def tessellate(surface: TriMesh, seeds: Floats, guess: Ints | None = None) -> Tessellation:
+def tessellate(surface: TriMesh, seeds: Floats, guess: Ints | None = None, threads: int | None = None) -> Tessellation:
     """The restricted Voronoi diagram of `seeds` (N, 3), N ≥ 2, all different, on the surface or near it.
 
     `guess` (F,), if given, is `first` of a diagram of nearly the same seeds: it saves time and changes nothing else.
+    Nor does the number of `threads`, by default one for each processor.
 
     Raises:
         RemeshError: a cell has more corners in one triangle than there is room for.
     """
     tree = cKDTree(seeds)
-    middles = surface.corners.mean(axis=1)
-    first = None if guess is None else guess.copy()
     others = min(NEIGHBOURS, len(seeds) - 1)
+    count = len(surface.faces)
+    ends = np.linspace(0, count, 1 + (1 if count <= CHUNK else 2 * -(-count // (2 * CHUNK)))).astype(np.int64)
+    parts = [slice(start, end) for start, end in pairwise(ends.tolist())]
+    first = np.full(count, -1, np.int64) if guess is None else guess.copy()
     while True:
         apart, near = map(np.asarray, tree.query(seeds, k=others + 1))  # the first is the seed itself
-        near, apart = np.ascontiguousarray(near[:, 1:], np.int64), np.ascontiguousarray(apart[:, 1:] ** 2)
-        if first is None or not _nearest(middles, seeds, near, apart, first):
-            first = np.asarray(tree.query(middles)[1], np.int64)
-        cells, triangles, sure = _restricted_voronoi(surface.corners, first, seeds, near, apart)
-        if sure:
-            return Tessellation(cells[:, 0], cells[:, 2:], cells[:, 1], triangles, first)
+        lists = np.ascontiguousarray(near[:, 1:], np.int64), np.ascontiguousarray(apart[:, 1:] ** 2)
+        found = _each(parts, lambda part, lists=lists: _clipped(surface, part, first, tree, lists), threads)
+        if all(sure for _, _, sure in found):
+            cells = np.sum([cells for cells, _, _ in found], axis=0)
+            return Tessellation(
+                cells[:, 0], cells[:, 2:], cells[:, 1], np.concatenate([three for _, three, _ in found]), first
+            )
         if others == len(seeds) - 1:
             raise RemeshError(
                 "seeds lie too unevenly for a Voronoi diagram",
@@ -261,6 +273,23 @@ def tessellate(surface: TriMesh, seeds: Floats, guess: Ints | None = None) -> Te
                 remedy="another --seed",
             )
         others = min(2 * others, len(seeds) - 1)
+
+
+def _clipped(surface: TriMesh, part: slice, first: Ints, tree: cKDTree, lists: tuple[Ints, Floats]) -> Part:
+    """`_restricted_voronoi` of some of the triangles; fills their `first`."""
+    middles, seeds = surface.middles[part], np.asarray(tree.data)
+    if not _nearest(middles, seeds, *lists, first[part]):
+        first[part] = tree.query(middles)[1]
+    return _restricted_voronoi(surface.corners[part], first[part], seeds, *lists)
+
+
+def _each(parts: list[slice], work: Callable[[slice], Part], threads: int | None) -> list[Part]:
+    """The work on each part, in order; the kernels let other threads run meanwhile."""
+    threads = min(threads or os.cpu_count() or 1, len(parts))
+    if threads == 1:
+        return [work(part) for part in parts]
+    with ThreadPoolExecutor(threads) as pool:
+        return list(pool.map(work, parts))
 
 
 def lloyd(surface: TriMesh, seeds: Floats, iterations: int) -> tuple[Floats, list[float]]:

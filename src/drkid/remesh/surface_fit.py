@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from drkid.measure import project, sample
+from drkid.measure import sample
 from drkid.mesh import Floats, Ints, TriMesh
 from drkid.remesh.closest_point import ClosestPoint
 from drkid.remesh.tangential_relaxation import moved_where_harmless
@@ -171,10 +171,10 @@ class SurfaceFit:
         return Points(np.repeat(np.arange(count), len(RULE)), np.tile(RULE, (count, 1)), away, direction, share)
 
     def _from_surface(self, mesh: TriMesh) -> Points:
-        there, face = project(mesh, self.points)
+        there, face, weights = ClosestPoint(mesh).in_faces(self.points)
         away, direction = _signed(there, self.points, mesh.face_normals[face], self._rounding)
         share = np.full(len(self.points), 1 / len(self.points))
-        return Points(face, barycentric(mesh.corners[face], there), away, direction, share)
+        return Points(face, weights, away, direction, share)
 
     @property
     def _rounding(self) -> float:
@@ -203,14 +203,3 @@ def _signed(here: Floats, there: Floats, normals: Floats, rounding: float) -> tu
     sign = np.where(np.einsum("ij,ij->i", apart, normals) < 0, -1.0, 1.0)
     direction = apart * (sign / np.maximum(size, rounding))[:, None]
     return size * sign, np.where((size > rounding)[:, None], direction, normals)
-
-
-def barycentric(corners: Floats, points: Floats) -> Floats:
-    """(P, 3): barycentric coordinates of points in triangles (Ericson, Real-Time Collision Detection, 3.4)."""
-    a, b, c = np.moveaxis(corners, 1, 0)
-    u, v, w = b - a, c - a, points - a
-    uu, uv, vv = (np.einsum("ij,ij->i", p, q) for p, q in ((u, u), (u, v), (v, v)))
-    wu, wv = (np.einsum("ij,ij->i", w, q) for q in (u, v))
-    area = np.maximum(uu * vv - uv * uv, np.finfo(float).tiny)
-    s, t = (vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area
-    return np.clip(np.column_stack([1 - s - t, s, t]), 0, 1)
