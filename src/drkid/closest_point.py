@@ -228,13 +228,17 @@ def projected(tree: TriangleTree, points: Floats, threads: int | None = None) ->
     points, order = np.ascontiguousarray(points), morton_order(points)
     slots, weights = np.zeros(len(points), np.int64), np.empty((len(points), 3))
     chunks = [order[start : start + CHUNK] for start in range(0, len(order), CHUNK)]
+
+    def look(chunk: Ints) -> None:
+        _along(tree, points, chunk, slots, weights)
+
     threads = min(threads or os.cpu_count() or 1, len(chunks))
     if threads > 1:
         with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(lambda chunk: _along(tree, points, chunk, slots, weights), chunks))
+            list(pool.map(look, chunks))
     else:
         for chunk in chunks:
-            _along(tree, points, chunk, slots, weights)
+            look(chunk)
     return np.einsum("ij,ijk->ik", weights, tree.corners[slots]), tree.face[slots], weights
 
 

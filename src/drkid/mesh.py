@@ -266,7 +266,7 @@ def _component_count(nodes: int, a: Ints, b: Ints) -> int:
 
 def summed(index: Ints, values: Floats, count: int) -> Floats:
     """(count, d): the sums of the `values` (n, d) of each `index` (n,), added in the order given."""
-    return np.column_stack([np.bincount(index, column, count) for column in values.T])
+    return np.column_stack([np.asarray(np.bincount(index, column, count), np.float64) for column in values.T])
 
 
 def _order(keys: Ints) -> Ints:
