@@ -4,7 +4,7 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drkid.mesh import TriMesh
+from drkid.mesh import TriMesh, _order, summed
 
 TETRAHEDRON = TriMesh(
     np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float),
@@ -117,3 +117,26 @@ def test_a_moved_mesh_keeps_what_is_known_of_its_topology_and_nothing_else():
     fresh = TriMesh(after.vertices, after.faces)
     assert (fresh.edges == after.edges).all()
     assert (fresh.face_edges == after.face_edges).all()
+
+
+@given(st.integers(0, 999), st.sampled_from([1, 2**60]))
+def test_edges_are_the_sorted_pairs_and_sides_stand_in_their_order(seed, stride):
+    """With few vertices, and with numbers so large that keys have no room for their places."""
+    rng = np.random.default_rng(seed)
+    faces = np.array([rng.choice(9, 3, replace=False) for _ in range(rng.integers(0, 12))]).reshape(-1, 3)
+    mesh = TriMesh(np.zeros((9, 3)), faces)
+    pairs, index = np.unique(np.sort(mesh.half_edges, axis=1), axis=0, return_inverse=True)
+    assert np.array_equal(mesh.edges, pairs)
+    assert np.array_equal(mesh.face_edges.ravel(), index.ravel())
+    assert np.array_equal(mesh.sides_by_edge, np.argsort(index.ravel(), kind="stable"))
+    assert mesh.used_vertices == len(np.unique(faces))
+    keys = stride * rng.integers(0, 5, 40)
+    assert np.array_equal(_order(keys), np.argsort(keys, kind="stable"))
+
+
+def test_sums_are_added_in_the_order_given():
+    rng = np.random.default_rng(0)
+    index, values = rng.integers(0, 7, 500), rng.normal(size=(500, 2))
+    expected = np.zeros((9, 2))
+    np.add.at(expected, index, values)
+    assert np.array_equal(summed(index, values, 9), expected)

@@ -4,9 +4,8 @@ from dataclasses import dataclass
 
 import igl
 import numpy as np
-from scipy.sparse import csr_array
 
-from drkid.mesh import Bools, Floats, Ints, TriMesh, read_only
+from drkid.mesh import Bools, Floats, Ints, TriMesh, read_only, summed
 
 CONCAVE_DEGREES = 1.0  # a joint counts as concave when its inner angle is above 180° by more than this
 NORMAL_SMOOTHING = 5  # rounds of averaging of vertex normals: voxels leave ripples in them
@@ -108,10 +107,9 @@ def smallest_angle_degrees(mesh: TriMesh) -> float:
 
 def smooth_normals(mesh: TriMesh) -> Floats:
     """(V, 3): unit vertex normals, averaged with their neighbours a few times."""
-    normals, (a, b) = mesh.vertex_normals, mesh.edges.T
-    rows, columns = np.concatenate([a, b]), np.concatenate([b, a])
-    adjacency = csr_array((np.ones(len(rows)), (rows, columns)), shape=(len(normals), len(normals)))
+    normals, every = mesh.vertex_normals, np.arange(len(mesh.vertices))
+    here, there = np.concatenate([every, *mesh.edges.T]), np.concatenate([every, *mesh.edges[:, ::-1].T])
     for _ in range(NORMAL_SMOOTHING):
-        total = normals + adjacency @ normals
+        total = summed(here, normals[there], len(every))
         normals = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), np.finfo(float).tiny)
     return normals

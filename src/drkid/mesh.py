@@ -6,7 +6,7 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 Floats = NDArray[np.float64]
@@ -58,6 +58,11 @@ class TriMesh:
         return read_only(self.vertices[self.faces])
 
     @cached_property
+    def middles(self) -> Floats:
+        """(F, 3): the centroid of each face."""
+        return read_only(self.corners.mean(axis=1))
+
+    @cached_property
     def _cross(self) -> Floats:
         a, b, c = np.moveaxis(self.corners, 1, 0)
         return read_only(np.cross(b - a, c - a))
@@ -76,9 +81,7 @@ class TriMesh:
     @cached_property
     def vertex_normals(self) -> Floats:
         """(V, 3): unit mean of the adjacent faces' unit normals (the paper, section Thickening)."""
-        corners = (self.faces.ravel(), np.repeat(np.arange(len(self.faces)), 3))
-        incidence = csr_array((np.ones(self.faces.size), corners), shape=(len(self.vertices), len(self.faces)))
-        total = np.zeros_like(self.vertices) + incidence @ self.face_normals
+        total = summed(self.faces.T.ravel(), np.tile(self.face_normals, (3, 1)), len(self.vertices))
         length = np.linalg.norm(total, axis=1, keepdims=True)
         return read_only(np.divide(total, length, out=np.zeros_like(total), where=length > 0))
 
@@ -122,14 +125,18 @@ class TriMesh:
         return read_only(np.stack([self.faces, np.roll(self.faces, -1, axis=1)], axis=2).reshape(-1, 2))
 
     @cached_property
-    def _edges_and_sides(self) -> tuple[Ints, Ints]:
-        keys = np.sort(self.half_edges, axis=1)
+    def _edges_and_sides(self) -> tuple[Ints, Ints, Ints]:
+        low, high = self.half_edges.min(axis=1), self.half_edges.max(axis=1)
         count = max(len(self.vertices), 1)
-        found, index = np.unique(
-            keys[:, 0] * count + keys[:, 1], return_inverse=True
-        )  # one number sorts faster than two
-        edges = np.column_stack(np.divmod(found, count))
-        return read_only(edges), read_only(index.reshape(-1, 3).astype(np.int64))
+        keys = low * count + high  # one number sorts faster than two
+        order = _order(keys)
+        keys = keys[order]
+        first = np.ones(len(keys), np.bool_)
+        first[1:] = keys[1:] != keys[:-1]
+        index = np.empty(len(keys), np.int64)
+        index[order] = np.cumsum(first) - 1
+        edges = np.column_stack(np.divmod(keys[first], count))
+        return read_only(edges), read_only(index.reshape(-1, 3)), read_only(order)
 
     @property
     def edges(self) -> Ints:
@@ -140,6 +147,11 @@ class TriMesh:
     def face_edges(self) -> Ints:
         """(F, 3): the edge at each side of a face."""
         return self._edges_and_sides[1]
+
+    @property
+    def sides_by_edge(self) -> Ints:
+        """(3F,): the sides of all faces, 3f + i, in the order of their edges; those of one edge in ascending order."""
+        return self._edges_and_sides[2]
 
     @cached_property
     def edge_faces(self) -> Ints:
@@ -180,7 +192,7 @@ class TriMesh:
     def pinched_vertices(self) -> int:
         """Number of surplus fans: vertices around which the faces do not form one cycle."""
         sides = np.arange(3 * len(self.faces)).reshape(-1, 3)
-        order = np.argsort(self.face_edges.ravel(), kind="stable")
+        order = self.sides_by_edge
         edge = self.face_edges.ravel()[order]
         same = np.flatnonzero(edge[1:] == edge[:-1])
         one, two = order[same], order[same + 1]
@@ -190,7 +202,7 @@ class TriMesh:
         fans = _component_count(
             sides.size, np.concatenate([one, following[one]]), np.concatenate([following[two], two])
         )
-        return max(0, fans - len(np.unique(self.faces)))
+        return max(0, fans - self.used_vertices)
 
     @cached_property
     def is_closed_manifold(self) -> bool:
@@ -203,7 +215,7 @@ class TriMesh:
     def face_component(self) -> Ints:
         """(F,): number of the edge-connected component that each face belongs to."""
         owner = np.repeat(np.arange(len(self.faces)), 3)
-        order = np.argsort(self.face_edges.ravel(), kind="stable")
+        order = self.sides_by_edge
         edge, owner = self.face_edges.ravel()[order], owner[order]
         same = edge[1:] == edge[:-1]
         graph = coo_array(
@@ -217,9 +229,14 @@ class TriMesh:
         return int(self.face_component.max(initial=-1)) + 1
 
     @cached_property
+    def used_vertices(self) -> int:
+        """Number of vertices that some face has."""
+        return int(np.count_nonzero(np.bincount(self.faces.ravel(), minlength=len(self.vertices))))
+
+    @cached_property
     def euler_characteristic(self) -> int:
         """V − E + F over the vertices that are used."""
-        return len(np.unique(self.faces)) - len(self.edges) + len(self.faces)
+        return self.used_vertices - len(self.edges) + len(self.faces)
 
     @property
     def genus(self) -> int:
@@ -252,3 +269,17 @@ class TriMesh:
 def _component_count(nodes: int, a: Ints, b: Ints) -> int:
     graph = coo_array((np.ones(len(a)), (a, b)), shape=(nodes, nodes))
     return int(connected_components(graph, directed=False)[0])
+
+
+def summed(index: Ints, values: Floats, count: int) -> Floats:
+    """(count, d): the sums of the `values` (n, d) of each `index` (n,), added in the order given."""
+    return np.column_stack([np.asarray(np.bincount(index, column, count), np.float64) for column in values.T])
+
+
+def _order(keys: Ints) -> Ints:
+    """The stable order that sorts `keys`, not negative: with its place behind it, a key is a number like others."""
+    bits = len(keys).bit_length()
+    if int(keys.max(initial=0)).bit_length() + bits > 63:
+        return np.argsort(keys, kind="stable")
+    places = np.arange(len(keys))
+    return np.sort((keys << bits) | places) & ((1 << bits) - 1)

@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 from drkid.errors import RemeshError
 from drkid.measure import sample
 from drkid.mesh import TriMesh
-from drkid.remesh.centroidal_voronoi import energy_and_gradient, lloyd, quasi_newton, tessellate
+from drkid.remesh.centroidal_voronoi import CHUNK, energy_and_gradient, lloyd, quasi_newton, tessellate
+from drkid.remesh.midpoint_subdivision import subdivided
 
 
 def seeds_on(mesh, count, seed=0):
@@ -58,6 +59,27 @@ def test_a_cell_of_too_many_corners_is_refused(box):
     ring = np.column_stack([0.3 + 0.1 * np.cos(angle), 0.6 + 0.1 * np.sin(angle), np.full(100, top)])
     with pytest.raises(RemeshError, match="too unevenly"):
         tessellate(box, np.concatenate([ring, [[0.3, 0.6, top]]]))
+
+
+@pytest.mark.parametrize("guess", [True, False])
+def test_threads_change_no_bit_of_the_cells(blob, guess):
+    fine = subdivided(blob, 2 * CHUNK)
+    seeds = seeds_on(fine, 300)
+    first = tessellate(fine, seeds).first if guess else None
+    one, two, four = (tessellate(fine, seeds + 1e-3, first, threads) for threads in (1, 2, 4))
+    assert len(fine.faces) > 2 * CHUNK
+    for other in (two, four):
+        assert all(np.array_equal(a, b) for a, b in zip(vars(one).values(), vars(other).values(), strict=True))
+
+
+def test_chunks_change_the_sums_by_rounding_alone(blob):
+    fine = subdivided(blob, 2 * CHUNK)
+    seeds = seeds_on(fine, 300)
+    parts = [tessellate(fine.submesh(part), seeds) for part in np.array_split(np.arange(len(fine.faces)), 7)]
+    cells = tessellate(fine, seeds)
+    assert np.allclose(sum(part.area for part in parts), cells.area, rtol=1e-12)
+    assert np.allclose(sum(part.energy for part in parts), cells.energy, rtol=1e-12)
+    assert np.array_equal(cells.first, cKDTree(seeds).query(fine.middles)[1])
 
 
 @given(st.integers(0, 1000))

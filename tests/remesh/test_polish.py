@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from drkid.measure import edge_spread, hausdorff
-from drkid.remesh.closest_point import ClosestPoint, barycentric
+from drkid.remesh.closest_point import ClosestPoint
 from drkid.remesh.dislocation_glide import glide
 from drkid.remesh.edge_collapse import collapse_to
 from drkid.remesh.offset_surface import offset_surface
@@ -85,14 +85,6 @@ def test_no_sweep_changes_nothing(rough):
     found = glide(rough, 0, 1.0, np.random.default_rng(0))
     assert np.array_equal(found.faces, rough.faces)
     assert np.array_equal(found.vertices, rough.vertices)
-
-
-@given(st.integers(0, 999))
-def test_barycentric_coordinates_give_the_point_back(seed):
-    rng = np.random.default_rng(seed)
-    corners, weights = rng.normal(size=(5, 3, 3)), rng.dirichlet(np.ones(3), 5)
-    points = np.einsum("pc,pcd->pd", weights, corners)
-    assert np.allclose(np.einsum("pc,pcd->pd", barycentric(corners, points), corners), points, atol=1e-6)
 
 
 def test_the_vertices_lie_on_the_offset_surface(rough, fit):

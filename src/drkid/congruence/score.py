@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from drkid.congruence.closest_point import TriangleTree, closest_points, triangle_tree
+from drkid.closest_point import TriangleTree, closest_points, triangle_tree
 from drkid.measure import Dihedral, bend_radians, dihedral, sample
 from drkid.mesh import Floats, TriMesh
 from drkid.spec import KitSpec

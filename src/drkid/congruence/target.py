@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from drkid.congruence.closest_point import TriangleTree, closest_slots, triangle_tree
+from drkid.closest_point import TriangleTree, closest_slots, triangle_tree
 from drkid.measure import smooth_normals
 from drkid.mesh import Floats, Ints, TriMesh
 

@@ -6,8 +6,11 @@ its security radius; Liu et al., "On centroidal Voronoi tessellation: energy smo
 2009), for the gradient and the quasi-Newton iterations.
 """
 
+import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +24,9 @@ from drkid.mesh import Floats, Ints, TriMesh
 
 NEIGHBOURS = 24  # of a seed, by which cells are clipped at first; doubled where the security radius asks for more
 CORNERS = 64  # most corners of a clipped triangle: three and one more for each bisector that cuts it
+CHUNK = 20_000  # triangles, about, that one thread clips at a time: sums depend on it, not on the number of threads
 MEMORY = 7  # corrections that L-BFGS keeps; the usual choice
+Part = tuple[Floats, Ints, bool]  # cells, dual triangles, and whether lists of neighbours were long enough
 Scalar = Any  # a number out of an array of them, which numpy's stubs take for an array
 
 
@@ -45,7 +50,7 @@ class Tessellation:
 # The kernels take whole arrays and indices: a view of a row costs more than the few sums that are made with it.
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _reach(polygons: Floats, here: int, count: int, sites: Floats, i: int) -> float:
     # Squared distance from the seed to the farthest corner.
     most = 0.0
@@ -57,7 +62,7 @@ def _reach(polygons: Floats, here: int, count: int, sites: Floats, i: int) -> fl
     return most
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _bisector(sites: Floats, i: int, j: int) -> tuple[float, float, float, float]:
     # The half-space nearer to seed i than to j: x p + y q + z r ≥ offset.
     x, y, z = sites[i, 0] - sites[j, 0], sites[i, 1] - sites[j, 1], sites[i, 2] - sites[j, 2]
@@ -65,7 +70,7 @@ def _bisector(sites: Floats, i: int, j: int) -> tuple[float, float, float, float
     return x, y, z, double / 2
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _cut(
     polygons: Floats,
     sides: Ints,
@@ -101,7 +106,7 @@ def _cut(
     return kept
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _clip(
     i: int, sites: Floats, near: Ints, apart: Floats, polygons: Floats, sides: Ints, left: Floats
 ) -> tuple[int, int]:
@@ -124,7 +129,7 @@ def _clip(
     return (count if near.shape[1] == len(sites) - 1 else -1), here
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _add_corner(triangles: Ints, found: int, i: int, j: int, k: int) -> int:
     # Three cells meet: each of them sees this corner, the first of them keeps it.
     if i < j and i < k and j != k and found < len(triangles):
@@ -133,7 +138,7 @@ def _add_corner(triangles: Ints, found: int, i: int, j: int, k: int) -> int:
     return found
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _integrate(polygons: Floats, here: int, count: int, sites: Floats, i: int, density: Scalar, cells: Floats) -> None:
     # Adds mass, energy and moment to cells[i]. Exact for the fan of triangles: the second moment of one about the seed
     # is A (Σ |p|² + |Σ p|²) / 12.
@@ -155,13 +160,13 @@ def _integrate(polygons: Floats, here: int, count: int, sites: Floats, i: int, d
         cells[i, 4] += mass * (r + sz / 3)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _squared_distance(points: Floats, i: int, sites: Floats, j: int) -> float:
     x, y, z = points[i, 0] - sites[j, 0], points[i, 1] - sites[j, 1], points[i, 2] - sites[j, 2]
     return x * x + y * y + z * z
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _nearer(middles: Floats, f: int, sites: Floats, near: Ints, apart: Floats, g: int) -> tuple[int, bool]:
     # The nearest among seed g and its neighbours, and whether no other seed can be nearer: one that is lies within
     # twice g's distance of g.
@@ -176,10 +181,13 @@ def _nearer(middles: Floats, f: int, sites: Floats, near: Ints, apart: Floats, g
     return best, near.shape[1] == len(sites) - 1
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _nearest(middles: Floats, sites: Floats, near: Ints, apart: Floats, first: Ints) -> bool:
-    # The seed nearest to each point, where `first` is a guess, in place. False where lists of neighbours are too short.
+    # The seed nearest to each point, where `first` is a guess, in place; where that is negative, the seed of the point
+    # before is the guess. False where lists of neighbours are too short.
     for f in range(len(middles)):
+        if first[f] < 0:
+            first[f] = first[f - 1] if f else 0
         sure = False
         while not sure:
             best, sure = _nearer(middles, f, sites, near, apart, first[f])
@@ -189,7 +197,7 @@ def _nearest(middles: Floats, sites: Floats, near: Ints, apart: Floats, first: I
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _restricted_voronoi(
     corners: Floats, density: Floats, first: Ints, sites: Floats, near: Ints, apart: Floats
 ) -> tuple[Floats, Ints, bool]:
@@ -236,29 +244,41 @@ def is_compiled() -> bool:
 
 
 def tessellate(
-    surface: TriMesh, seeds: Floats, guess: Ints | None = None, density: Floats | None = None
+    surface: TriMesh,
+    seeds: Floats,
+    guess: Ints | None = None,
+    density: Floats | None = None,
+    threads: int | None = None,
 ) -> Tessellation:
     """The restricted Voronoi diagram of `seeds` (N, 3), N ≥ 2, all different, on the surface or near it.
 
     `density` (F,) is that of each of the surface's triangles, 1 where None; it weighs integrals and moves no border.
     `guess` (F,), if given, is `first` of a diagram of nearly the same seeds: it saves time and changes nothing else.
+    Nor does the number of `threads`, by default one for each processor.
 
     Raises:
         RemeshError: a cell has more corners in one triangle than there is room for.
     """
     tree = cKDTree(seeds)
-    middles = surface.corners.mean(axis=1)
     density = np.ones(len(surface.faces)) if density is None else density
-    first = None if guess is None else guess.copy()
     others = min(NEIGHBOURS, len(seeds) - 1)
+    count = len(surface.faces)
+    ends = np.linspace(0, count, 1 + (1 if count <= CHUNK else 2 * -(-count // (2 * CHUNK)))).astype(np.int64)
+    parts = [slice(start, end) for start, end in pairwise(ends.tolist())]
+    first = np.full(count, -1, np.int64) if guess is None else guess.copy()
     while True:
         apart, near = map(np.asarray, tree.query(seeds, k=others + 1))  # the first is the seed itself
-        near, apart = np.ascontiguousarray(near[:, 1:], np.int64), np.ascontiguousarray(apart[:, 1:] ** 2)
-        if first is None or not _nearest(middles, seeds, near, apart, first):
-            first = np.asarray(tree.query(middles)[1], np.int64)
-        cells, triangles, sure = _restricted_voronoi(surface.corners, density, first, seeds, near, apart)
-        if sure:
-            return Tessellation(cells[:, 0], cells[:, 2:], cells[:, 1], triangles, first)
+        lists = np.ascontiguousarray(near[:, 1:], np.int64), np.ascontiguousarray(apart[:, 1:] ** 2)
+
+        def clipped(part: slice, lists: tuple[Ints, Floats] = lists) -> Part:
+            return _clipped(surface, density, part, first, tree, lists)
+
+        found = _each(parts, clipped, threads)
+        if all(sure for _, _, sure in found):
+            cells = np.sum([cells for cells, _, _ in found], axis=0)
+            return Tessellation(
+                cells[:, 0], cells[:, 2:], cells[:, 1], np.concatenate([three for _, three, _ in found]), first
+            )
         if others == len(seeds) - 1:
             raise RemeshError(
                 "seeds lie too unevenly for a Voronoi diagram",
@@ -267,6 +287,25 @@ def tessellate(
                 remedy="another --seed",
             )
         others = min(2 * others, len(seeds) - 1)
+
+
+def _clipped(
+    surface: TriMesh, density: Floats, part: slice, first: Ints, tree: cKDTree, lists: tuple[Ints, Floats]
+) -> Part:
+    """`_restricted_voronoi` of some of the triangles; fills their `first`."""
+    middles, seeds = surface.middles[part], np.asarray(tree.data)
+    if not _nearest(middles, seeds, *lists, first[part]):
+        first[part] = tree.query(middles)[1]
+    return _restricted_voronoi(surface.corners[part], density[part], first[part], seeds, *lists)
+
+
+def _each(parts: list[slice], work: Callable[[slice], Part], threads: int | None) -> list[Part]:
+    """The work on each part, in order; the kernels let other threads run meanwhile."""
+    threads = min(threads or os.cpu_count() or 1, len(parts))
+    if threads == 1:
+        return [work(part) for part in parts]
+    with ThreadPoolExecutor(threads) as pool:
+        return list(pool.map(work, parts))
 
 
 def lloyd(

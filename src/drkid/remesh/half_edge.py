@@ -27,7 +27,7 @@ class HalfEdges(NamedTuple):
 def half_edges(mesh: TriMesh) -> HalfEdges:
     """The half-edges of a closed manifold mesh whose vertices are all used."""
     origin = mesh.faces.ravel().copy()
-    order = np.argsort(mesh.face_edges.ravel(), kind="stable").reshape(-1, 2)
+    order = mesh.sides_by_edge.reshape(-1, 2)
     twin = np.empty_like(origin)
     twin[order[:, 0]], twin[order[:, 1]] = order[:, 1], order[:, 0]
     start = np.empty(len(mesh.vertices), np.int64)

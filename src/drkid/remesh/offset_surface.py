@@ -6,9 +6,9 @@ move them about at that height needs the surface of that height, not M_i.
 
 import numpy as np
 
-from drkid.measure import project, smooth_normals
+from drkid.measure import smooth_normals
 from drkid.mesh import TriMesh
-from drkid.remesh.closest_point import ClosestPoint, barycentric
+from drkid.remesh.closest_point import ClosestPoint
 
 
 def offset_surface(closest: ClosestPoint, mesh: TriMesh) -> TriMesh:
@@ -17,7 +17,6 @@ def offset_surface(closest: ClosestPoint, mesh: TriMesh) -> TriMesh:
     foot, normals = closest(mesh.vertices)
     apart = mesh.vertices - foot
     height = np.linalg.norm(apart, axis=1) * np.sign(np.einsum("ij,ij->i", apart, normals))
-    there, face = project(mesh, surface.vertices)
-    weights = barycentric(mesh.corners[face], there)
+    _, face, weights = ClosestPoint(mesh).in_faces(surface.vertices)
     rise = np.einsum("ij,ij->i", weights, height[mesh.faces[face]])
     return surface.moved(surface.vertices + rise[:, None] * smooth_normals(surface))

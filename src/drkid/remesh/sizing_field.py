@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 import igl
 import numpy as np
-from scipy.sparse import coo_array, diags_array
+from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.sparse.linalg import cg
 
 from drkid.measure import bend_radians
 from drkid.mesh import Floats, TriMesh
-from drkid.remesh.closest_point import ClosestPoint, barycentric
+from drkid.remesh.closest_point import ClosestPoint
 
 SMOOTHING_EDGES = 0.5  # edges over which curvature is averaged: what is smaller than an edge no edge can follow
 CONTRAST = 4.0  # curvature counts as at least 1/4 and at most 4 times its mean: edges as at most 1 to 4
@@ -35,8 +35,7 @@ class SizingField:
     def __call__(self, points: Floats) -> Floats:
         """(P,): the length wanted at the point of the surface that is closest to each of `points` (P, 3)."""
         surface = self.closest.surface
-        there, face = self.closest.located(points)
-        weights = barycentric(surface.corners[face], there)
+        _, face, weights = self.closest.in_faces(points)
         return np.einsum("ij,ij->i", weights, self.length[surface.faces[face]]) / weights.sum(axis=1)
 
     def density(self, points: Floats) -> Floats:
@@ -86,8 +85,8 @@ def curvature(surface: TriMesh, radius: float) -> Floats:
     for end in range(2):
         np.add.at(tensor, surface.edges[:, end], bent[:, None] * along[:, rows] * along[:, columns])
     mass = np.bincount(surface.faces.ravel(), np.repeat(surface.areas / 3, 3), minlength=len(surface.vertices))
-    stiffness = -igl.cotmatrix(surface.vertices, surface.faces)
-    system = (diags_array(mass) + radius**2 / 2 * stiffness).tocsr()
+    stiffness = csr_array(-igl.cotmatrix(surface.vertices, surface.faces))
+    system = (diags_array(mass) + stiffness * (radius**2 / 2)).tocsr()
     jacobi = diags_array(1 / system.diagonal())
     smooth = np.column_stack([cg(system, tensor[:, k], rtol=PRECISION, M=jacobi)[0] for k in range(6)])
     return np.sqrt((smooth**2 * np.where(rows == columns, 1, 2)).sum(axis=1))
@@ -105,4 +104,4 @@ def _limited(surface: TriMesh, wanted: Floats) -> Floats:
         ),
         shape=(count + 1, count + 1),
     )
-    return GRADATION * np.asarray(dijkstra(graph.tocsr(), indices=count), np.float64)[:count]
+    return GRADATION * np.asarray(dijkstra(graph.tocsr(), indices=[count]), np.float64)[0, :count]

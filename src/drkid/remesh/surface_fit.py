@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from drkid.measure import project, sample
+from drkid.measure import sample
 from drkid.mesh import Floats, Ints, TriMesh
-from drkid.remesh.closest_point import ClosestPoint, barycentric
+from drkid.remesh.closest_point import ClosestPoint
 from drkid.remesh.sizing_field import SizingField, goals
 from drkid.remesh.tangential_relaxation import moved_where_harmless
 
@@ -176,10 +176,10 @@ class SurfaceFit:
         return Points(np.repeat(np.arange(count), len(RULE)), np.tile(RULE, (count, 1)), away, direction, share)
 
     def _from_surface(self, mesh: TriMesh) -> Points:
-        there, face = project(mesh, self.points)
+        there, face, weights = ClosestPoint(mesh).in_faces(self.points)
         away, direction = _signed(there, self.points, mesh.face_normals[face], self._rounding)
         share = np.full(len(self.points), 1 / len(self.points))
-        return Points(face, barycentric(mesh.corners[face], there), away, direction, share)
+        return Points(face, weights, away, direction, share)
 
     @property
     def _rounding(self) -> float:

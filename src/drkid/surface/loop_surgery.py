@@ -97,16 +97,16 @@ def _outside_the_neck(mesh: TriMesh, loop: Floats) -> Bools:
     one, two = _rims(mesh.half_edges[(beyond < 0).ravel()])
     for rim, other in ((one, two), (two, one)):
         left = MOST_REMOVED / 2 * float(mesh.areas.sum())
-        here: Ints | None = rim
-        while here is not None:
+        here = rim
+        while True:
             ring = np.flatnonzero(kept & np.isin(mesh.faces, here).any(axis=1))
             left -= float(mesh.areas[ring].sum())
-            here = _far_rim(mesh, ring, beyond, kept)
-            if here is None or left < 0 or _spread(mesh.vertices[here]) > FLARE * _spread(loop):
+            far = _far_rim(mesh, ring, beyond, kept)
+            if far is None or left < 0 or _spread(mesh.vertices[far]) > FLARE * _spread(loop):
                 break
             if np.isin(mesh.faces[ring], other).any():
                 break
-            kept[ring] = False
+            kept[ring], here = False, far
     return kept
 
 

@@ -8,7 +8,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from quadratic_problem import pebble, small_ring
 
-from drkid.congruence.closest_point import LEAF, closest_points, closest_slots, triangle_tree
+from drkid.closest_point import (
+    CHUNK,
+    LEAF,
+    MORTON_BITS,
+    closest_points,
+    closest_slots,
+    morton_order,
+    morton_tree,
+    projected,
+    triangle_tree,
+)
 from drkid.mesh import TriMesh
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -105,10 +115,11 @@ def test_a_triangle_whose_corners_coincide_is_a_segment_or_a_point(shared, seed)
     assert_closest(mesh, points, closest_points(triangle_tree(mesh), points))
 
 
+@pytest.mark.parametrize("make", [triangle_tree, morton_tree])
 @pytest.mark.parametrize("count", [1, LEAF - 1, LEAF, 2 * LEAF - 1, 2 * LEAF, 2 * LEAF + 1, 37, 320])
-def test_the_tree_is_complete_and_its_boxes_hold_what_is_below(count):
+def test_the_tree_is_complete_and_its_boxes_hold_what_is_below(make, count):
     mesh = soup(count, np.random.default_rng(count))
-    tree = triangle_tree(mesh)
+    tree = make(mesh)
     leaves = len(tree.low) // 2
     size = len(tree.face) // leaves
     assert leaves * size == len(tree.face)
@@ -186,6 +197,39 @@ def test_they_move_and_scale_with_the_mesh(seed, factor):
     other, _, there = closest_points(triangle_tree(moved), factor * points @ turn + away)
     np.testing.assert_allclose(np.sqrt(other), factor * np.sqrt(squared), atol=1e-12 * (1 + factor))
     np.testing.assert_allclose(there, factor * closest @ turn + away, atol=1e-11 * (1 + factor))
+
+
+@given(count=st.integers(1, 70), seed=SEEDS)
+def test_projections_are_the_closest_points(count, seed):
+    rng = np.random.default_rng(seed)
+    mesh, points = soup(count, rng), 2 * rng.normal(size=(30, 3))
+    closest, face, weights = projected(morton_tree(mesh), points)
+    assert_closest(mesh, points, (((points - closest) ** 2).sum(axis=1), face, closest))
+    np.testing.assert_allclose(np.einsum("pc,pcd->pd", weights, mesh.corners[face]), closest, atol=1e-12)
+
+
+def test_threads_change_no_bit_of_the_projections():
+    mesh, rng = pebble(), np.random.default_rng(0)
+    points = 2 * rng.normal(size=(3 * CHUNK + 5, 3))
+    one, two, four = (projected(morton_tree(mesh), points, threads) for threads in (1, 2, 4))
+    for other in (two, four):
+        assert all(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
+
+
+@given(SEEDS)
+def test_mortons_curve_interleaves_the_bits(seed):
+    points = np.random.default_rng(seed).integers(0, 2**MORTON_BITS, (20, 3))
+    points[0], points[1] = 0, 2**MORTON_BITS - 1
+    codes = [
+        sum(((int(c) >> bit) & 1) << (3 * bit + axis) for axis, c in enumerate(p) for bit in range(MORTON_BITS))
+        for p in points
+    ]
+    np.testing.assert_array_equal(morton_order(points.astype(float)), np.argsort(codes, kind="stable"))
+
+
+def test_no_point_and_one_place_have_an_order():
+    assert morton_order(np.empty((0, 3))).shape == (0,)
+    np.testing.assert_array_equal(morton_order(np.ones((4, 3))), np.arange(4))
 
 
 def _ball():

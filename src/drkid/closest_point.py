@@ -1,9 +1,12 @@
 """Closest points on a triangle mesh, compiled and without the interpreter's lock.
 
-A bounding volume hierarchy over the triangles, halved at the median along the longest axis; a query starts from a
-triangle that is near already and visits only boxes that are nearer (Ericson 2005, sections 5.1.5 and 6.2).
+A bounding volume hierarchy over the triangles, halved at the median along the longest axis, or along Morton's curve,
+which is made in a fraction of the time; a query starts from a triangle that is near already and visits only boxes that
+are nearer (Ericson 2005, sections 5.1.5 and 6.2).
 """
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +15,8 @@ from numba import njit
 from drkid.mesh import Floats, Ints, TriMesh
 
 LEAF = 4  # least number of triangles in a leaf
+MORTON_BITS = 15  # of each coordinate
+CHUNK = 2048  # points that one thread looks for at a time, along Morton's curve
 DEEPEST = 64  # levels of any tree, and more than its stack ever holds
 
 
@@ -69,18 +74,58 @@ def _halved(centroids: Floats, order: Ints, depth: int) -> None:
 
 def triangle_tree(mesh: TriMesh) -> TriangleTree:
     """The tree of a mesh's triangles; one is enough."""
-    depth = max(int(np.log2(max(len(mesh.faces) / LEAF, 1))), 0)
+    depth = _depth(mesh)
+    order = _filled(np.arange(len(mesh.faces)), depth)
+    _halved(np.ascontiguousarray(mesh.middles.T), order, depth)
+    return _bounded(mesh, order, depth)
+
+
+def morton_tree(mesh: TriMesh) -> TriangleTree:
+    """The same for few queries: made in a tenth of the time, its boxes overlap more.
+
+    Triangles stand in the order of Morton's curve (Karras, "Maximizing parallelism in the construction of BVHs,
+    octrees, and k-d trees", 2012, section 3).
+    """
+    depth = _depth(mesh)
+    return _bounded(mesh, _filled(morton_order(mesh.middles), depth), depth)
+
+
+def morton_order(points: Floats) -> Ints:
+    """(n,): the order of points (n, 3) along Morton's curve, which visits neighbours one after the other, mostly."""
+    if not len(points):
+        return np.empty(0, np.int64)
+    away = points - points.min(axis=0)
+    place = (away * ((2**MORTON_BITS - 1) / (away.max() or 1.0))).astype(np.int64)
+    code = np.zeros(len(points), np.int64)
+    for axis in range(3):
+        bits = place[:, axis]
+        for shift, mask in ((16, 0x0000FF0000FF), (8, 0x00F00F00F00F), (4, 0x0C30C30C30C3), (2, 0x249249249249)):
+            bits = (bits | (bits << shift)) & mask
+        code |= bits << axis
+    return np.argsort(code, kind="stable")
+
+
+def _depth(mesh: TriMesh) -> int:
+    return max(int(np.log2(max(len(mesh.faces) / LEAF, 1))), 0)
+
+
+def _filled(order: Ints, depth: int) -> Ints:
+    """The order with some triangles twice, so that all leaves have the same number."""
+    return np.resize(order, -(-len(order) // 2**depth) * 2**depth)
+
+
+def _bounded(mesh: TriMesh, order: Ints, depth: int) -> TriangleTree:
     leaves = 2**depth
-    order = np.resize(np.arange(len(mesh.faces)), -(-len(mesh.faces) // leaves) * leaves)
-    _halved(np.ascontiguousarray(mesh.corners.mean(axis=1).T), order, depth)
     corners = np.ascontiguousarray(mesh.corners[order])
     low, high = np.zeros((2 * leaves, 3)), np.zeros((2 * leaves, 3))
     boxes = corners.reshape(leaves, -1, 3)
-    low[leaves:], high[leaves:] = boxes.min(axis=1), boxes.max(axis=1)
-    for level in range(depth - 1, -1, -1):
-        first, last = 2**level, 2 ** (level + 1)
-        low[first:last] = low[last : 2 * last].reshape(-1, 2, 3).min(axis=1)
-        high[first:last] = high[last : 2 * last].reshape(-1, 2, 3).max(axis=1)
+    for extreme, ends in ((np.minimum, low), (np.maximum, high)):  # of two arrays: an axis of length two is slow
+        ends[leaves:] = boxes[:, 0]
+        for corner in range(1, boxes.shape[1]):
+            extreme(ends[leaves:], boxes[:, corner], out=ends[leaves:])
+        for first in (2**level for level in range(depth - 1, -1, -1)):
+            children = ends[2 * first : 4 * first]
+            extreme(children[::2], children[1::2], out=ends[first : 2 * first])
     return TriangleTree(low, high, corners, order.astype(np.int64))
 
 
@@ -195,6 +240,40 @@ def closest_slots(tree: TriangleTree, points: Floats, slots: Ints) -> tuple[Floa
         second, third = _weights(tree.corners[slots[i]], points[i])
         weights[i, 0], weights[i, 1], weights[i, 2] = 1.0 - second - third, second, third
     return squared, weights
+
+
+@njit(cache=True, nogil=True)
+def _along(tree: TriangleTree, points: Floats, order: Ints, slots: Ints, weights: Floats) -> None:
+    # For the points of `order`: the slots and the weights in them. Each looks first where the one before it was.
+    stack = np.empty(DEEPEST, np.int64)
+    slot = 0
+    for i in order:
+        _, slot = _nearest(tree.low, tree.high, tree.corners, points[i], slot, stack)
+        second, third = _weights(tree.corners[slot], points[i])
+        slots[i] = slot
+        weights[i, 0], weights[i, 1], weights[i, 2] = 1.0 - second - third, second, third
+
+
+def projected(tree: TriangleTree, points: Floats, threads: int | None = None) -> tuple[Floats, Ints, Floats]:
+    """The closest points on the mesh (n, 3), their triangles (n,) and barycentric weights in these (n, 3).
+
+    The number of `threads`, by default one for each processor, changes the time it takes and nothing else.
+    """
+    points, order = np.ascontiguousarray(points), morton_order(points)
+    slots, weights = np.zeros(len(points), np.int64), np.empty((len(points), 3))
+    chunks = [order[start : start + CHUNK] for start in range(0, len(order), CHUNK)]
+
+    def look(chunk: Ints) -> None:
+        _along(tree, points, chunk, slots, weights)
+
+    threads = min(threads or os.cpu_count() or 1, len(chunks))
+    if threads > 1:
+        with ThreadPoolExecutor(threads) as pool:
+            list(pool.map(look, chunks))
+    else:
+        for chunk in chunks:
+            look(chunk)
+    return np.einsum("ij,ijk->ik", weights, tree.corners[slots]), tree.face[slots], weights
 
 
 def closest_points(tree: TriangleTree, points: Floats) -> tuple[Floats, Ints, Floats]:
