@@ -38,6 +38,7 @@ MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 FIRST_GUESS_THICKNESSES = 4.0  # mean edge of the pieces with which the search for a size begins
 WHOLE_MM = 1e-6
 MOST_OF_SIDE = 0.4  # of the shortest side: how wide a pocket may be that is proposed for its strength
+ROUNDING_ROOM = 1.005  # lengths rounded up to tenths of a mm make triangles of a slightly other shape
 SMALLER = 1 - 1e-4  # of a scale: what another connector must save to be taken
 MOST_THICKENINGS = 12  # of curved pieces, each of which may need a larger size; two or three do
 MOST_BEVEL_OF_REACH = 0.5  # of a connector's reach: what the bevels of curved pieces may leave without walls
@@ -256,7 +257,7 @@ def _required_scale(design: _Design, scale: float) -> float:
     sides = ", ".join(f"{x:g}" for x in np.round(design.decomposition.class_lengths[index] * scale, 6))
     factor = design.smallest_scale / scale
     lengths = np.unique(np.round(design.decomposition.class_lengths * scale, 6))
-    longer = ",".join(f"{ceil(10 * factor * x) / 10:g}" for x in lengths)
+    longer = ",".join(f"{ceil(10 * ROUNDING_ROOM * factor * x) / 10:g}" for x in lengths)
     raise FitError(
         f"the {margin.what} of class {design.moulds.name(index)} does not fit at the given lengths (sides {sides} mm)",
         wanted=f"{margin.needed_mm:.2f} mm",
