@@ -25,7 +25,7 @@ from drkid.parts.key import box_key
 from drkid.parts.make_merged import merged_parts
 from drkid.parts.marks import marked
 from drkid.parts.members import Members
-from drkid.parts.notes import groove_notes, notes
+from drkid.parts.notes import connector_notes, groove_notes, notes
 from drkid.parts.pocket import pocket, side_frames
 from drkid.parts.prismoid import Prismoid
 from drkid.parts.process_findings import findings
@@ -74,7 +74,7 @@ def make_parts(
     shapes = design.pieces(scale)
     recess = recesses_of(found, shapes, scale)
     width = groove_mm(decomposition.mesh, members, recess)
-    choices = () if curved else groove_choices(decomposition, design.dimensions, spec, scale)
+    choices = () if patches else groove_choices(decomposition, design.dimensions, spec, scale)
     parts, face_part = _parts(design, shapes, scale)
     part_set = PartSet(
         scale_mm_per_unit=scale,
@@ -92,7 +92,7 @@ def make_parts(
         coupon=coupon(design.dimensions, spec),
     )
     if patches is not None and patches.merged:
-        part_set = merged_parts(patches, part_set, spec)
+        part_set = merged_parts(patches, part_set, spec, tuple(connector_notes(members, design.dimensions)))
     part_set = _marked(part_set, spec)
     for part in part_set.parts:
         _require_bed(part, spec)
@@ -310,9 +310,9 @@ def _marked(part_set: PartSet, spec: KitSpec) -> PartSet:
         return part_set
     if spec.patch == "curved" or part_set.merged:
         kind = "Curved" if spec.patch == "curved" else "Merged"
-        return replace(
-            part_set, notes=(*part_set.notes, f"{kind} pieces have no one plane inside: they bear no marks.")
-        )
+        note = f"{kind} pieces have no one plane inside, and bear no marks."
+        findings_ = tuple(finding for finding in part_set.findings if finding.subject != "marks")
+        return replace(part_set, notes=(*part_set.notes, note), findings=findings_)
     made, notes_ = list[Part](), list[str]()
     for part in part_set.parts:
         found, missing = marked(part, part_set.dimensions, spec.preset.engrave_width_mm, depth)

@@ -16,11 +16,12 @@ from drkid.spec import FOLLOWING, KitSpec
 MOST_MIDDLE_INSET = 0.45  # of the thickness: how far a side may stand back from the hinge axis at mid-height
 
 
-def merged_parts(patches: Patches, of_triangles: PartSet, spec: KitSpec) -> PartSet:
+def merged_parts(patches: Patches, of_triangles: PartSet, spec: KitSpec, notes: tuple[str, ...] = ()) -> PartSet:
     """The part set of merged pieces, from that of the same triangles unmerged.
 
     Every triangle of a piece keeps its pockets on the outline, and a piece has no pocket that its triangles did not
-    have room for: what fits unmerged fits merged.
+    have room for: what fits unmerged fits merged. What was found of single triangles' walls and bevels is left out;
+    `notes` take the place of theirs.
     """
     scale, dimensions = of_triangles.scale_mm_per_unit, of_triangles.dimensions
     mesh_mm = patches.decomposition.mesh.scaled(scale)
@@ -39,6 +40,9 @@ def merged_parts(patches: Patches, of_triangles: PartSet, spec: KitSpec) -> Part
         face_part=read_only(face_part),
         face_turn=read_only(np.zeros(len(face_part), np.int64)),
         groove_mm=read_only(_grooves(mesh_mm, patches.pieces, insets, dimensions)),
+        notes=notes,
+        findings=tuple(finding for finding in of_triangles.findings if not finding.subject.startswith("class ")),
+        groove_choices=(),
         merged=patches.pieces,
     )
 

@@ -55,11 +55,19 @@ class Builder:
         corners, polygon = triangulated([p for polygons in self._placed for p in polygons])
         piece = np.repeat(np.arange(len(self._placed)), [len(polygons) for polygons in self._placed])[polygon]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        outwards = np.einsum("nk,nk->n", normal, self.guide.scene.transforms[piece][:, :3, 2])
-        cosine = outwards / np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)
-        most = np.zeros(len(self._placed))  # 1 but for a bent piece, whose faces all lean
-        np.maximum.at(most, piece, cosine)
-        return corners, piece, cosine > OUTER_COSINE * most[piece]
+        outwards = np.einsum("nwk,nk->nw", self._outwards[piece], normal).max(axis=1)
+        return corners, piece, outwards > OUTER_COSINE * np.linalg.norm(normal, axis=1)
+
+    @cached_property
+    def _outwards(self) -> Floats:
+        """(P, w, 3): the outward normals of each piece: its own, or those of the faces that are merged in it."""
+        scene = self.guide.scene
+        covered = [piece.covered for piece in scene.document.pieces]
+        out = np.repeat(scene.transforms[:, None, :3, 2], max(map(len, covered)), axis=1)
+        for own, faces in zip(out, covered, strict=True):
+            if len(faces) > 1:
+                own[:] = scene.assembled.face_normals[np.resize(faces, len(own))]
+        return out
 
     @cached_property
     def _outer_area(self) -> Floats:
@@ -168,7 +176,8 @@ class Builder:
         scene = self.guide.scene
         one = scene.document.pieces[piece]
         part = next(p for c in scene.document.classes for p in c.parts if p.file == one.part)
-        corners = np.array(part.corners) + np.array([0, 0, scene.parts[one.part].vertices[:, 2].max()])
+        corners = np.array(part.corners)
+        corners[:, 2] += scene.parts[one.part].vertices[:, 2].max() - corners[:, 2].max()
         return corners @ scene.transforms[piece][:3, :3].T + scene.transforms[piece][:3, 3]
 
     def _label(self, piece: int, instruction: Instruction | None, corners: Floats) -> list[Shape | Word]:
