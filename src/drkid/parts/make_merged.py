@@ -26,10 +26,7 @@ def merged_parts(patches: Patches, of_triangles: PartSet, spec: KitSpec, notes: 
     scale, dimensions = of_triangles.scale_mm_per_unit, of_triangles.dimensions
     mesh_mm = patches.decomposition.mesh.scaled(scale)
     shapes = tuple(_scaled(shape, scale) for shape in patches.merged)
-    insets = [
-        _insets(mesh_mm, shape, [p for p in patches.pieces if p.class_index == k], dimensions, spec)
-        for k, shape in enumerate(shapes)
-    ]
+    insets = merged_insets(patches, scale, dimensions, spec)
     parts = tuple(_part(k, shape, insets[k], dimensions) for k, shape in enumerate(shapes))
     face_part = np.zeros(len(mesh_mm.faces), np.int64)
     for piece in patches.pieces:
@@ -45,6 +42,16 @@ def merged_parts(patches: Patches, of_triangles: PartSet, spec: KitSpec, notes: 
         groove_choices=(),
         merged=patches.pieces,
     )
+
+
+def merged_insets(patches: Patches, scale: float, dimensions: Dimensions, spec: KitSpec) -> list[Floats]:
+    """For each shape (2, n): how far its sides stand back from their hinge axes at the inner and outer face, in mm."""
+    mesh_mm = patches.decomposition.mesh.scaled(scale)
+    members: list[list[MergedPiece]] = [[] for _ in patches.merged]
+    for piece in patches.pieces:
+        members[piece.class_index].append(piece)
+    zipped = zip(patches.merged, members, strict=True)
+    return [_insets(mesh_mm, _scaled(shape, scale), own, dimensions, spec) for shape, own in zipped]
 
 
 def _scaled(shape: MergedClass, scale: float) -> MergedClass:
