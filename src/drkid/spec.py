@@ -351,8 +351,8 @@ class KitSpec(BaseModel):
     merge_shift_percent: float = _field(
         5.0,
         "Patches",
-        "How far vertices may move so that merged pieces need fewer shapes, in percent of the mean edge; with 0, or "
-        "where lengths are given, they stay.",
+        "How far vertices may leave the surface so that merged pieces need fewer shapes, in percent of the mean edge; "
+        "with 0, or where lengths are given, they stay.",
         ge=0,
         le=50,
     )

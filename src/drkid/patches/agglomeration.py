@@ -43,7 +43,7 @@ class _Limits:
 
 
 def agglomerated(mesh: TriMesh, pieces: list[Outlined], tolerance: float, most_shift: float) -> Shapes:
-    """Few shapes such that no piece is farther than `tolerance` from its own, and no vertex moved by over `most_shift`.
+    """Few shapes: no piece farther than `tolerance` from its own, no vertex off the surface by more than `most_shift`.
 
     Greedy: the nearest shapes first, several at once while that succeeds. Both limits are in the mesh's unit; where
     `most_shift` is 0 the mesh stays as it is.
@@ -113,7 +113,7 @@ def _merged(found: Shapes, chosen: list[tuple[int, int, int]], limits: _Limits) 
         return tried if tried.misfit.max() <= limits.tolerance else None
     vertices = made_congruent(found.vertices, pieces, shape, limits.held)
     tried = _with_inner(_measured(vertices, pieces, shape))
-    moved = np.linalg.norm(tried.vertices - limits.held.vertices, axis=1).max()
+    moved = limits.held.moved(tried.vertices).max()
     return tried if moved <= limits.shift and tried.misfit.max() <= limits.tolerance else None
 
 

@@ -30,6 +30,11 @@ class Place:
     vertices: Floats
     metric: Floats
 
+    def moved(self, vertices: Floats) -> Floats:
+        """(V,): how far vertices are from their place, off the surface; the way along it counts by `ALONG`."""
+        off = vertices - self.vertices
+        return np.sqrt(np.einsum("vi,vij,vj->v", off, self.metric, off))
+
 
 def place(mesh: TriMesh) -> Place:
     """The mesh's own place: normals are the mean ones of the faces round each vertex, by area."""
@@ -99,8 +104,7 @@ def _lengths(vertices: Floats, distances: _Distances) -> tuple[Floats, Floats]:
 
 def _merit(vertices: Floats, distances: _Distances, held: Place) -> float:
     apart = distances.centred(_lengths(vertices, distances)[0])
-    moved = vertices - held.vertices
-    return float(apart @ apart + HOLD**2 * np.einsum("vi,vij,vj->", moved, held.metric, moved))
+    return float(apart @ apart + HOLD**2 * (held.moved(vertices) ** 2).sum())
 
 
 def _normal_equations(vertices: Floats, distances: _Distances, held: Place) -> tuple[Floats, Floats]:

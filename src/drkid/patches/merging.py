@@ -7,6 +7,7 @@ import numpy as np
 from drkid.kit import Decomposition, MergedClass, MergedPiece, Outcome, Patches
 from drkid.mesh import Floats, TriMesh, read_only
 from drkid.patches.agglomeration import agglomerated, renumbered
+from drkid.patches.distance_geometry import place
 from drkid.patches.identity import mirror_corners, misfits
 from drkid.patches.matching import paired
 from drkid.patches.outline import Outlined, outlined
@@ -20,9 +21,9 @@ SAME_SIDE = 1e-6  # of a length: sides that differ by less do not decide which c
 def merged_patches(decomposition: Decomposition, spec: KitSpec, tolerance: float) -> Patches:
     """Faces merged as `spec.merge` asks, in as few shapes as are found within `tolerance` (the mesh's unit).
 
-    For fewer shapes vertices of M_f move by `spec.merge_shift_percent` of the mean edge at most, unless the lengths of
-    the edges are given: then M_f stays. A shape is the mean of its pieces, or laid into its mean plane where all of its
-    triangles bend by `spec.merge_flat_degrees` at most.
+    For fewer shapes vertices leave M_f's surface by `spec.merge_shift_percent` of the mean edge at most, unless the
+    lengths of the edges are given: then M_f stays. A shape is the mean of its pieces, or laid into its mean plane where
+    all of its triangles bend by `spec.merge_flat_degrees` at most.
     """
     mesh = decomposition.mesh
     given = decomposition.scale_mm_per_unit is not None
@@ -48,7 +49,21 @@ def merged_patches(decomposition: Decomposition, spec: KitSpec, tolerance: float
             misfit[p] = misfits(points, own.points(mesh))
     pieces = tuple(piece for piece in placed if piece is not None)
     divided = _divided(replace(decomposition, mesh=mesh), tuple(classes), pieces, spec)
-    return Patches(divided, merged=tuple(classes), pieces=pieces, misfit=read_only(misfit), allowance=tolerance)
+    return Patches(
+        divided,
+        merged=tuple(classes),
+        pieces=pieces,
+        misfit=read_only(misfit),
+        notes=_moved(decomposition.mesh, mesh),
+        allowance=tolerance,
+    )
+
+
+def _moved(before: TriMesh, after: TriMesh) -> tuple[str, ...]:
+    moved = 100 * float(place(before).moved(after.vertices).max()) / before.mean_edge
+    if not moved:
+        return ()
+    return (f"Vertices left the surface by up to {moved:.1f} % of the mean edge so that more merged pieces are alike.",)
 
 
 def _turned(points: Floats, piece: Outlined, by: int) -> Floats:

@@ -11,7 +11,7 @@ from drkid.report.colouring import channels
 from drkid.report.drawing import Drawing, Shape, Word
 from drkid.report.guide import Guide, Instruction
 from drkid.report.hidden_surface import Painted, painted, triangulated
-from drkid.report.outline import outline
+from drkid.report.outline import creases, outline
 from drkid.report.picture import camera
 from drkid.report.rasteriser import rasterise
 
@@ -22,8 +22,28 @@ MOST_VIEWS = 4  # of one group
 LEAST_FACING = 0.3  # cosine to the eye below which a face is too oblique for words
 STANDING, STANDING_LINE, NEW_LINE = "#E4E6EA", "#8A8F99", "#000000"
 OUTER_COSINE = 0.99  # to the piece's normal: faces that are more oblique are its sides
+ON_SIDE = 1e-6  # of a face's size: points that are nearer to one of its sides lie on it
 STEEPEST = 80.0  # degrees of elevation
 DIRECTIONS = [(float(a), float(e)) for e in (-60, -20, 20, 60) for a in range(0, 360, 45)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Face:
+    """A polygon (n, 3) of a piece in view coordinates, and which of its sides are drawn (n,)."""
+
+    piece: int
+    polygon: Floats
+    drawn: Bools
+
+    def draws(self, part: Floats) -> list[bool]:
+        """For each side of a part of the polygon, into which it may be cut, whether it lies on a side that is drawn."""
+        start, along = self.polygon[self.drawn], (np.roll(self.polygon, -1, axis=0) - self.polygon)[self.drawn]
+        if not len(start):
+            return [False] * len(part)
+        ends = part[:, None] - start
+        across = np.linalg.norm(np.cross(ends, along), axis=-1) / np.linalg.norm(along, axis=-1)
+        near = across < ON_SIDE * float(np.ptp(self.polygon, axis=0).max())
+        return (near & np.roll(near, -1, axis=0)).any(axis=1).tolist()
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +55,10 @@ class Builder:
     @cached_property
     def _bodies(self) -> dict[str, tuple[Floats, ...]]:
         return {file: outline(mesh) for file, mesh in self.guide.scene.parts.items()}
+
+    @cached_property
+    def _creases(self) -> dict[str, tuple[Bools, ...]]:
+        return {file: creases(polygons) for file, polygons in self._bodies.items()}
 
     @cached_property
     def _size(self) -> float:
@@ -116,29 +140,42 @@ class Builder:
         standing = [one.piece for one in self.guide.instructions[: group[-1].step]]
         new = {one.piece: one for one in group}
         asked = {join.other_step for one in group for join in one.joins}
-        flat = [(i, (p - self.guide.scene.middle) @ view.T) for i in standing for p in self._placed[i]]
-        flat = [(i, p) for i, p in flat if _signed_area(p) > 0]
-        found = painted([p for _, p in flat], SAMPLES)
-        owner = np.array([i for i, _ in flat])[found.source]
-        points = np.concatenate([p for _, p in flat])
+        faces = [
+            _Face(i, (polygon - self.guide.scene.middle) @ view.T, drawn)
+            for i in standing
+            for polygon, drawn in zip(
+                self._placed[i], self._creases[self.guide.scene.document.pieces[i].part], strict=True
+            )
+        ]
+        faces = [face for face in faces if _signed_area(face.polygon) > 0]
+        found = painted([face.polygon for face in faces], SAMPLES)
+        points = np.concatenate([face.polygon for face in faces])
         low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
         scale = min(width / (high - low)[0], height / (high - low)[1]) * 0.97
         size = (high - low) * scale
         sheet = np.array([size[0], size[1]]) * 1.02
         shift = sheet / 2 - (low + high) / 2 * scale
-        items = self._shapes(found, owner, set(new), scale, shift)
+        items = self._shapes(found, faces, set(new), scale, shift)
         words = self._words(standing, new, asked, view, (scale, shift))
         title = f"Steps {group[0].step} to {group[-1].step}: what stands, the new pieces coloured"
         return Drawing(float(sheet[0]), float(sheet[1]), (*items, *words), title)
 
-    def _shapes(self, found: Painted, owner: Ints, new: set[int], scale: float, shift: Floats) -> list[Shape]:
+    def _shapes(self, found: Painted, faces: list[_Face], new: set[int], scale: float, shift: Floats) -> list[Shape]:
+        """Faces and their creases; those without a crease are closed by a line of their own colour."""
         shapes: list[Shape] = []
-        for polygon, piece in zip(found.polygons, owner.tolist(), strict=True):
-            tone = _tone(polygon)
-            code = class_colour(int(self.guide.scene.piece_class[piece])) if piece in new else STANDING
-            fill = _shaded(code, tone if piece not in new else 0.55 + 0.45 * tone)
-            line = NEW_LINE if piece in new else STANDING_LINE
-            shapes.append(Shape(polygon[:, :2] * scale + shift, fill, line, 0.35 if piece in new else 0.15))
+        for polygon, source in zip(found.polygons, found.source.tolist(), strict=True):
+            face, tone = faces[source], _tone(polygon)
+            own = face.piece in new
+            code = class_colour(int(self.guide.scene.piece_class[face.piece])) if own else STANDING
+            fill = _shaded(code, 0.55 + 0.45 * tone if own else tone)
+            line, width = (NEW_LINE, 0.35) if own else (STANDING_LINE, 0.15)
+            flat = polygon[:, :2] * scale + shift
+            if face.drawn.all() and len(polygon) == len(face.polygon):
+                shapes.append(Shape(flat, fill, line, width))
+                continue
+            shapes.append(Shape(flat, fill, fill, 0.15))
+            sides = zip(flat, np.roll(flat, -1, axis=0), face.draws(polygon), strict=True)
+            shapes += [Shape(np.stack([a, b]), None, line, width) for a, b, drawn in sides if drawn]
         return shapes
 
     def _words(
