@@ -9,7 +9,7 @@ NEARLY_CONVEX = 1.7  # volume of the hull over the part's: more than its pockets
 DECIMALS = 5  # of unit normals and of distances in mm, by which triangles share a plane
 MOST_VERTICES = 40  # of a hull that is drawn as it is: a flat triangle has 6 or 12, a curved one hundreds
 CELLS = 7  # along a hull with more: of the vertices of each cell the farthest out is kept
-CREASE_COSINE = np.cos(np.radians(25.0))  # of the angle between faces, from which on their edge is drawn
+CREASE_COSINE = np.cos(np.radians(35.0))  # of the angle between faces, from which on their edge is drawn
 
 
 def outline(mesh: TriMesh) -> tuple[Floats, ...]:
