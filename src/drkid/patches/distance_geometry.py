@@ -58,7 +58,7 @@ class _Distances:
 
     def centred(self, lengths: Floats) -> Floats:
         """Lengths (R,) less their means over the pieces of a shape."""
-        return lengths - self.means.T @ (self.share * (self.means @ lengths))
+        return lengths - np.asarray(self.means.T @ (self.share * (self.means @ lengths)), np.float64)
 
 
 def _distances(pieces: list[Outlined], shape: Ints) -> _Distances:
@@ -114,9 +114,10 @@ def _normal_equations(vertices: Floats, distances: _Distances, held: Place) -> t
     jacobian = csr_array(
         (np.concatenate([along, -along], axis=1).ravel(), (rows, columns)), shape=(len(length), 3 * count)
     )
-    mean = distances.means @ jacobian
+    mean = csr_array(distances.means @ jacobian)
     pull = HOLD**2 * np.einsum("vij,vj->vi", held.metric, vertices - held.vertices)
-    hessian = (jacobian.T @ jacobian - mean.T @ mean.multiply(distances.share[:, None])).toarray(order="C")
+    product = csr_array(jacobian.T @ jacobian - mean.T @ mean.multiply(distances.share[:, None]))
+    hessian = np.ascontiguousarray(product.toarray(), np.float64)
     every = np.arange(count)
     hessian.reshape(count, 3, count, 3)[every, :, every, :] += HOLD**2 * held.metric
-    return hessian, jacobian.T @ distances.centred(length) + pull.ravel()
+    return hessian, np.asarray(jacobian.T @ distances.centred(length), np.float64) + pull.ravel()
