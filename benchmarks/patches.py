@@ -34,7 +34,8 @@ CURVED: tuple[tuple[str, dict[str, object]], ...] = (
     ("canonical", {"patch": "curved", "curved_classes": 2}),
     ("canonical", {"patch": "curved", "curved_classes": 4}),
 )
-MERGES, TOLERANCES_MM = (2, 5, 6, 7), (0.02, 0.2, 1.0)
+MERGES = (2, 5, 6, 7)
+SHIFTS_AND_TOLERANCES = ((0.0, 0.02), (0.0, 0.1), (0.0, 0.2), (0.0, 1.0), (5.0, 0.02))  # percent of the edge, mm
 Row = dict[str, float | int | str]
 
 
@@ -65,22 +66,25 @@ def curved_row(surface: Surface, decomposition: Decomposition, kind: str, option
     }
 
 
-def merged_row(decomposition: Decomposition, surface: Surface, merge: int, tolerance_mm: float, size_mm: float) -> Row:
+def merged_row(decomposition: Decomposition, surface: Surface, size_mm: float, options: dict[str, object]) -> Row:
     """One row of the second table, at the size of the print of the unmerged triangles."""
-    spec = KitSpec.parse({"merge": merge, "merge_tolerance_mm": tolerance_mm, "size_mm": size_mm})
+    spec = KitSpec.parse({"size_mm": size_mm, **options})
     patches = make_patches(decomposition, surface.mesh, spec)
     assert patches is not None, "merge was asked for"
     assert patches.misfit is not None, "merged pieces have a misfit"
     scale = size_mm / float(decomposition.mesh.extents.max())
+    apart = hausdorff(surface.mesh, patches.decomposition.mesh, np.random.default_rng(SAMPLING_SEED))
     return {
-        "merge": merge,
-        "tolerance_mm": tolerance_mm,
+        "merge": int(spec.merge or 0),
+        "tolerance_mm": spec.merge_tolerance_mm,
+        "shift_percent": spec.merge_shift_percent,
         "triangles": len(decomposition.mesh.faces),
         "triangle_moulds": len(decomposition.class_lengths),
         "pieces": len(patches.pieces),
         "moulds": len(patches.merged),
         "single_triangles": sum(len(piece.faces) == 1 for piece in patches.pieces),
         "misfit_max_mm": float(patches.misfit.max()) * scale,
+        "distance_mean_percent": apart.mean * 100 / surface.mesh.diagonal,
     }
 
 
@@ -91,8 +95,13 @@ def measured(path: Path, only: str) -> dict[str, object]:
     decomposition = decompose(simplify(surface, spec).mesh, spec, surface=surface.mesh)
     curved = [curved_row(surface, decomposition, *row) for row in (CURVED[:1] if only == "merged" else CURVED)]
     size = float(curved[0]["mean_edge_mm"]) / decomposition.mesh.mean_edge * float(decomposition.mesh.extents.max())
-    wanted = [] if only == "curved" else [(m, t) for m in MERGES for t in TOLERANCES_MM]
-    merged = [merged_row(decomposition, surface, m, t, size) for m, t in wanted]
+    wanted = [] if only == "curved" else [(m, *row) for m in MERGES for row in SHIFTS_AND_TOLERANCES]
+    merged = [
+        merged_row(
+            decomposition, surface, size, {"merge": m, "merge_shift_percent": shift, "merge_tolerance_mm": tolerance}
+        )
+        for m, shift, tolerance in wanted
+    ]
     return {"shape": path.name, "faces": len(decomposition.mesh.faces), "curved": curved, "merged": merged}
 
 

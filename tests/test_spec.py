@@ -72,6 +72,16 @@ from drkid.spec import MOST_WALKED_FACES, PRINTERS, PROCESSES, UNIVERSAL, UNIVER
         ({"net_scale": 0}, ["net_scale", "greater than 0"]),
         ({"net_on_one_page": "perhaps"}, ["net_on_one_page", "perhaps"]),
         ({"documents": "some"}, ["documents", "some"]),
+        ({"merge": 2, "patch": "curved"}, ["patch is curved", "merge is 2", "give one"]),
+        ({"merge": 2, "bevel_variants": 2}, ["bevel_variants is 2", "merge is 2", "bevels of its own"]),
+        ({"merge": 6, "mark_depth_mm": 0.4}, ["mark_depth_mm is 0.4", "merge is 6"]),
+        ({"patch": "curved", "mark_depth_mm": 0.4}, ["mark_depth_mm is 0.4", "patch is curved"]),
+        ({"curved_classes": 4}, ["curved_classes is given", "--patch curved"]),
+        ({"curved": "published"}, ["curved is given", "--patch curved"]),
+        ({"merge": 2, "subdivision_levels": 2}, ["subdivision_levels is given", "--patch curved"]),
+        ({"merge_shift_percent": 1}, ["merge_shift_percent is given", "--merge"]),
+        ({"patch": "curved", "merge_tolerance_mm": 1}, ["merge_tolerance_mm is given", "--merge"]),
+        ({"patch": "curved", "curved": "published", "curved_gap_mm": 1}, ["curved_gap_mm", "canonical"]),
     ],
 )
 def test_what_cannot_be_used_is_named(values, words):

@@ -64,8 +64,9 @@ def make_kit(source: str | Path | None = None, spec: KitSpec | None = None, prog
         patches = make_patches(decomposition, surface.mesh, spec, told)
     triangles = decomposition
     decomposition = decomposition if patches is None else patches.decomposition
+    unmerged = triangles if spec.merge else decomposition
     with stage("parts") as told:
-        part_set = make_parts(triangles if spec.merge else decomposition, spec, told, patches)
+        part_set = make_parts(unmerged, spec, told, patches)
     scale = part_set.scale_mm_per_unit
     printed = _scaled(decomposition, scale)
     with stage("assembly") as told:
@@ -74,7 +75,7 @@ def make_kit(source: str | Path | None = None, spec: KitSpec | None = None, prog
         surfaces = surface.mesh.scaled(scale), simplified.mesh.scaled(scale)
         metrics = measure_kit(*surfaces, printed, part_set, {}, patches, len(triangles.class_lengths))
     return Kit(
-        spec=_resolved(spec, surface, printed, part_set).model_copy(
+        spec=_resolved(spec, surface, unmerged, part_set).model_copy(
             update=_patch_choices(spec, patches, len(triangles.class_lengths), scale)
         ),
         source=surface.source,
@@ -150,8 +151,12 @@ def _crossings(decomposition: Decomposition) -> tuple[str, ...]:
     return (f"{count} pairs of faces of the assembled surface cut each other: take more faces",) if count else ()
 
 
-def _resolved(spec: KitSpec, surface: Surface, printed: Decomposition, part_set: PartSet) -> KitSpec:
-    """The spec with every automatic choice filled in, so that the same kit can be made from it again."""
+def _resolved(spec: KitSpec, surface: Surface, unmerged: Decomposition, part_set: PartSet) -> KitSpec:
+    """The spec with every automatic choice filled in, so that the same kit can be made from it again.
+
+    The size is that of the mesh before triangles are merged, which may move its vertices.
+    """
+    size_mm = float(unmerged.mesh.extents.max()) * part_set.scale_mm_per_unit
     source, dimensions = surface.source, part_set.dimensions
     return spec.model_copy(
         update={
@@ -161,10 +166,10 @@ def _resolved(spec: KitSpec, surface: Surface, printed: Decomposition, part_set:
             "spacing": source.voxel_size,
             "unit": source.voxel_unit,
             "faces": None if spec.vertices is not None else spec.faces or DEFAULT_FACES,
-            "tolerance_percent": spec.tolerance_for(len(printed.mesh.faces)),
+            "tolerance_percent": spec.tolerance_for(len(unmerged.mesh.faces)),
             "seconds": None,
-            "rounds": printed.iterations if spec.method == "palette" else None,
-            "size_mm": None if spec.palette is not None else round(float(printed.mesh.extents.max()), 9),
+            "rounds": unmerged.iterations if spec.method == "palette" else None,
+            "size_mm": None if spec.palette is not None else round(size_mm, 9),
             "thickness_mm": dimensions.thickness_mm,
             "clearance_mm": dimensions.clearance_mm,
             "rod_clearance_mm": dimensions.rod_clearance_mm,
@@ -174,9 +179,16 @@ def _resolved(spec: KitSpec, surface: Surface, printed: Decomposition, part_set:
             "knuckles": dimensions.knuckles or None,
             "mean_edge_mm": None,
             "fit": False,
-            "mark_depth_mm": spec.preset.mark_depth_mm if spec.mark_depth_mm is None else spec.mark_depth_mm,
+            "mark_depth_mm": _mark_depth_mm(spec),
         }
     )
+
+
+def _mark_depth_mm(spec: KitSpec) -> float:
+    """How deep the marks of the pieces are: curved and merged ones bear none."""
+    if spec.patch == "curved" or spec.merge is not None:
+        return 0.0
+    return spec.preset.mark_depth_mm if spec.mark_depth_mm is None else spec.mark_depth_mm
 
 
 def _patch_choices(spec: KitSpec, patches: Patches | None, triangle_classes: int, scale: float) -> dict[str, object]:

@@ -2,7 +2,7 @@
 
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, Literal, cast, get_args
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
@@ -355,6 +355,14 @@ class KitSpec(BaseModel):
     merge_flat_degrees: float = _field(
         0.0, "Patches", "Merged pieces whose triangles bend by no more than this are made flat.", ge=0, le=45
     )
+    merge_shift_percent: float = _field(
+        5.0,
+        "Patches",
+        "How far vertices may leave the surface so that merged pieces need fewer shapes, in percent of the mean edge; "
+        "with 0, or where lengths are given, they stay.",
+        ge=0,
+        le=50,
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -535,11 +543,42 @@ def _palette_contradiction(spec: KitSpec) -> str:
     return ""
 
 
+_OF_CURVED = ("curved", "curved_classes", "curved_gap_mm", "subdivision_levels")
+_OF_MERGED = ("merge_tolerance_mm", "merge_flat_degrees", "merge_shift_percent")
+
+
 def _patch_contradiction(spec: KitSpec) -> str:
-    """What is wrong between patch and merge; empty where nothing is."""
-    if spec.patch == "curved" and spec.merge is not None:
+    """What is wrong between patch, merge and what only one kind of pieces has; empty where nothing is."""
+    if spec.patch == "flat" and (name := _changed(spec, _OF_CURVED)):
+        return f"{name} is given and patch is flat: only --patch curved has curved pieces"
+    if spec.curved == "published" and spec.curved_gap_mm is not None:
+        return "curved_gap_mm is given and curved is published: only canonical patches keep to a gap"
+    if spec.patch == "curved" and spec.mark_depth_mm:
+        return f"mark_depth_mm is {spec.mark_depth_mm:g} and patch is curved: no plane is inside to engrave"
+    return _merge_contradiction(spec)
+
+
+def _merge_contradiction(spec: KitSpec) -> str:
+    name = _changed(spec, _OF_MERGED)
+    if spec.merge is None:
+        kinds = ", ".join(map(str, get_args(Merge)))
+        return f"{name} is given and merge is not: only --merge (one of {kinds}) merges pieces" if name else ""
+    if spec.patch == "curved":
         return f"patch is curved and merge is {spec.merge}: give one, merged pieces are made of flat triangles"
+    if spec.bevel_variants > 1:
+        return (
+            f"bevel_variants is {spec.bevel_variants} and merge is {spec.merge}: every merged shape has bevels of its "
+            "own already; a lesser --merge-tolerance-mm makes more shapes"
+        )
+    if spec.mark_depth_mm:
+        return f"mark_depth_mm is {spec.mark_depth_mm:g} and merge is {spec.merge}: no one plane is inside to engrave"
     return ""
+
+
+def _changed(spec: KitSpec, names: tuple[str, ...]) -> str:
+    """The first of these parameters that is not what it is where nothing is given; empty where all are."""
+    fields = type(spec).model_fields
+    return next((name for name in names if getattr(spec, name) != fields[name].default), "")
 
 
 def _reworded(error: ValidationError) -> SpecError:

@@ -114,7 +114,8 @@ def _ticked(half: Connector, number: int, spec: KitSpec) -> Solid:
 
 
 def _mark_depth_mm(spec: KitSpec) -> float:
-    return spec.preset.mark_depth_mm if spec.mark_depth_mm is None else spec.mark_depth_mm
+    """A coupon tells its fits by its marks, also where pieces have none."""
+    return spec.mark_depth_mm or spec.preset.mark_depth_mm
 
 
 def _shifted(by: tuple[float, float, float] | Floats) -> Floats:

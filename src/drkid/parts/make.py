@@ -22,10 +22,10 @@ from drkid.parts.groove import groove_mm
 from drkid.parts.groove_choices import groove_choices, recesses_of
 from drkid.parts.hinge import hinge_half
 from drkid.parts.key import box_key
-from drkid.parts.make_merged import merged_parts
+from drkid.parts.make_merged import merged_insets, merged_parts
 from drkid.parts.marks import marked
 from drkid.parts.members import Members
-from drkid.parts.notes import corner_notes, groove_notes, notes
+from drkid.parts.notes import connector_notes, corner_notes, groove_notes, notes
 from drkid.parts.pocket import pocket, side_frames
 from drkid.parts.prismoid import Prismoid
 from drkid.parts.process_findings import findings
@@ -68,7 +68,8 @@ def make_parts(
     sharpest = max(bends) + spec.swing_degrees
     progress("finding the size", 0.2)
     curved = tuple(patches.curved[k] for k in found.class_index) if patches and patches.curved else ()
-    design = _chosen([_Design(found, d, spec, curved) for d in proposals(spec, sharpest)])
+    merged = patches if patches and patches.merged else None
+    design = _chosen([_Design(found, d, spec, curved, merged) for d in proposals(spec, sharpest)])
     design, scale = _scaled(design)
     require_bends(decomposition.mesh.scaled(scale), spec)
     progress("cutting parts", 0.5)
@@ -76,7 +77,7 @@ def make_parts(
     shapes = corners.shapes
     recess = recesses_of(found, shapes, scale)
     width = groove_mm(decomposition.mesh, members, recess)
-    choices = () if curved else groove_choices(decomposition, design.dimensions, spec, scale)
+    choices = () if patches else groove_choices(decomposition, design.dimensions, spec, scale)
     parts, face_part = _parts(design, shapes, scale)
     part_set = PartSet(
         scale_mm_per_unit=scale,
@@ -99,8 +100,8 @@ def make_parts(
         cut_corners=corners.corners,
         deepest_cut_mm=corners.deepest_mm,
     )
-    if patches is not None and patches.merged:
-        part_set = merged_parts(patches, part_set, spec)
+    if merged is not None:
+        part_set = merged_parts(merged, part_set, spec, tuple(connector_notes(members, design.dimensions)))
     part_set = _marked(part_set, spec)
     for part in part_set.parts:
         _require_bed(part, spec)
@@ -116,6 +117,7 @@ class _Design:
     dimensions: Dimensions
     spec: KitSpec
     curved: tuple[CurvedPatch, ...] = ()
+    merged: Patches | None = None
 
     @property
     def decomposition(self) -> Decomposition:
@@ -152,14 +154,17 @@ class _Design:
         return max((needed_thickness_mm(t, p.scaled(scale), self.dimensions) for t, p in zipped), default=0.0)
 
     def needed_depth_mm(self, scale: float) -> float:
-        """How deep pockets of curved pieces are, so that their bevels, deeper than flat ones', leave the hold.
+        """How deep pockets of curved and merged pieces are, so that their own bevels leave the hold.
 
-        0 where pieces are flat or have no pockets.
+        0 where pieces are flat triangles or have no pockets.
         """
-        if not self.curved or self.dimensions.connector == "none":
+        if not (self.curved or self.merged) or self.dimensions.connector == "none":
             return 0.0
-        zipped = zip(self.pieces(scale), self.triangles(scale), strict=True)
-        deepest = max(float(piece.insets(triangle).max()) for piece, triangle in zipped)
+        if self.merged is not None:
+            insets = merged_insets(self.merged, scale, self.dimensions, self.spec)
+        else:
+            insets = [p.insets(t) for p, t in zip(self.pieces(scale), self.triangles(scale), strict=True)]
+        deepest = max(float(inset.max()) for inset in insets)
         return deepest / MOST_BEVEL_OF_REACH + 2 * self.dimensions.clearance_mm
 
     def tightest(self, scale: float) -> tuple[int, Margin]:
@@ -332,9 +337,9 @@ def _marked(part_set: PartSet, spec: KitSpec) -> PartSet:
         return part_set
     if spec.patch == "curved" or part_set.merged:
         kind = "Curved" if spec.patch == "curved" else "Merged"
-        return replace(
-            part_set, notes=(*part_set.notes, f"{kind} pieces have no one plane inside: they bear no marks.")
-        )
+        note = f"{kind} pieces have no one plane inside, and bear no marks."
+        findings_ = tuple(finding for finding in part_set.findings if finding.subject != "marks")
+        return replace(part_set, notes=(*part_set.notes, note), findings=findings_)
     made, notes_ = list[Part](), list[str]()
     for part in part_set.parts:
         found, missing = marked(part, part_set.dimensions, spec.preset.engrave_width_mm, depth)

@@ -16,19 +16,17 @@ from drkid.spec import FOLLOWING, KitSpec
 MOST_MIDDLE_INSET = 0.45  # of the thickness: how far a side may stand back from the hinge axis at mid-height
 
 
-def merged_parts(patches: Patches, of_triangles: PartSet, spec: KitSpec) -> PartSet:
+def merged_parts(patches: Patches, of_triangles: PartSet, spec: KitSpec, notes: tuple[str, ...] = ()) -> PartSet:
     """The part set of merged pieces, from that of the same triangles unmerged.
 
     Every triangle of a piece keeps its pockets on the outline, and a piece has no pocket that its triangles did not
-    have room for: what fits unmerged fits merged.
+    have room for: what fits unmerged fits merged. What was found of single triangles' walls and bevels is left out;
+    `notes` take the place of theirs.
     """
     scale, dimensions = of_triangles.scale_mm_per_unit, of_triangles.dimensions
     mesh_mm = patches.decomposition.mesh.scaled(scale)
     shapes = tuple(_scaled(shape, scale) for shape in patches.merged)
-    insets = [
-        _insets(mesh_mm, shape, [p for p in patches.pieces if p.class_index == k], dimensions, spec)
-        for k, shape in enumerate(shapes)
-    ]
+    insets = merged_insets(patches, scale, dimensions, spec)
     parts = tuple(_part(k, shape, insets[k], dimensions) for k, shape in enumerate(shapes))
     face_part = np.zeros(len(mesh_mm.faces), np.int64)
     for piece in patches.pieces:
@@ -39,8 +37,21 @@ def merged_parts(patches: Patches, of_triangles: PartSet, spec: KitSpec) -> Part
         face_part=read_only(face_part),
         face_turn=read_only(np.zeros(len(face_part), np.int64)),
         groove_mm=read_only(_grooves(mesh_mm, patches.pieces, insets, dimensions)),
+        notes=notes,
+        findings=tuple(finding for finding in of_triangles.findings if not finding.subject.startswith("class ")),
+        groove_choices=(),
         merged=patches.pieces,
     )
+
+
+def merged_insets(patches: Patches, scale: float, dimensions: Dimensions, spec: KitSpec) -> list[Floats]:
+    """For each shape (2, n): how far its sides stand back from their hinge axes at the inner and outer face, in mm."""
+    mesh_mm = patches.decomposition.mesh.scaled(scale)
+    members: list[list[MergedPiece]] = [[] for _ in patches.merged]
+    for piece in patches.pieces:
+        members[piece.class_index].append(piece)
+    zipped = zip(patches.merged, members, strict=True)
+    return [_insets(mesh_mm, _scaled(shape, scale), own, dimensions, spec) for shape, own in zipped]
 
 
 def _scaled(shape: MergedClass, scale: float) -> MergedClass:

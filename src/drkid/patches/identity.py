@@ -31,7 +31,7 @@ def residuals(mesh: TriMesh, pieces: list[Outlined]) -> tuple[Floats, Ints]:
     """(P, P) residual of every piece j against piece i, and the turn of j at which it is least; infinite where none."""
     count = len(pieces)
     least, turn = np.full((count, count), np.inf), np.zeros((count, count), np.int64)
-    for own in _built_alike(pieces):
+    for own in built_alike(pieces):
         first = pieces[own[0]]
         aligned = [pieces[p].turned(relabellings(first, pieces[p])[0]) for p in own]
         start = np.array([relabellings(first, pieces[p])[0] for p in own])
@@ -47,7 +47,7 @@ def residuals(mesh: TriMesh, pieces: list[Outlined]) -> tuple[Floats, Ints]:
     return least, turn
 
 
-def _built_alike(pieces: list[Outlined]) -> list[list[int]]:
+def built_alike(pieces: list[Outlined]) -> list[list[int]]:
     """Pieces grouped by the pattern of their triangles, whichever corner is first."""
     groups: dict[tuple[tuple[int, ...], ...], list[int]] = defaultdict(list)
     for i, piece in enumerate(pieces):

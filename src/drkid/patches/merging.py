@@ -5,52 +5,76 @@ from dataclasses import replace
 import numpy as np
 
 from drkid.kit import Decomposition, MergedClass, MergedPiece, Outcome, Patches
-from drkid.measure import bend_radians
 from drkid.mesh import Floats, TriMesh, read_only
-from drkid.patches.identity import mirror_corners, misfits, residuals, shapes
+from drkid.patches.agglomeration import agglomerated, renumbered
+from drkid.patches.distance_geometry import place
+from drkid.patches.identity import mirror_corners, misfits
 from drkid.patches.matching import paired
 from drkid.patches.outline import Outlined, outlined
 from drkid.patches.vertex_star import starred
 from drkid.spec import KitSpec
 
+LIKELY = 0.25  # of the most shift: pieces that differ by no more are likely to be made alike
 SAME_SIDE = 1e-6  # of a length: sides that differ by less do not decide which corner is first
 
 
 def merged_patches(decomposition: Decomposition, spec: KitSpec, tolerance: float) -> Patches:
     """Faces merged as `spec.merge` asks, in as few shapes as are found within `tolerance` (the mesh's unit).
 
-    A shape is that of the piece nearest to most others, its corners as they are, or laid into their mean plane where
+    For fewer shapes vertices leave M_f's surface by `spec.merge_shift_percent` of the mean edge at most, unless the
+    lengths of the edges are given: then M_f stays. A shape is the mean of its pieces, or laid into its mean plane where
     all of its triangles bend by `spec.merge_flat_degrees` at most.
     """
     mesh = decomposition.mesh
-    groups = paired(mesh, tolerance) if spec.merge == 2 else starred(mesh, int(spec.merge or 2), tolerance)
-    pieces = [outlined(mesh, group) for group in groups]
-    residual, turn = residuals(mesh, pieces)
-    stands = shapes(residual, tolerance)
-    leaders, count = np.unique(stands, return_counts=True)
-    leaders = leaders[np.argsort(-count, kind="stable")]
+    given = decomposition.scale_mm_per_unit is not None
+    shift = 0.0 if given else spec.merge_shift_percent / 100 * mesh.mean_edge
+    near = max(tolerance, LIKELY * shift)
+    groups = paired(mesh, near) if spec.merge == 2 else starred(mesh, int(spec.merge or 2), near)
+    found = renumbered(agglomerated(mesh, [outlined(mesh, group) for group in groups], tolerance, shift))
+    mesh = mesh.moved(found.vertices)
     limit = np.radians(spec.merge_flat_degrees)
     classes: list[MergedClass] = []
-    placed: list[MergedPiece | None] = [None] * len(pieces)
-    misfit = np.zeros(len(pieces))
-    for index, leader in enumerate(leaders.tolist()):
-        first = _first_corner(mesh, pieces[leader])
-        model = pieces[leader].turned(first)
-        shape = _shape(mesh, model, limit, tolerance)
+    placed: list[MergedPiece | None] = [None] * len(groups)
+    misfit = np.zeros(len(groups))
+    for index, mean in sorted(found.means.items()):
+        members = np.flatnonzero(found.shape == index).tolist()
+        model = found.pieces[members[0]]
+        first = _first_corner(mean[: len(model.vertices)])
+        shape = _shape(_turned(mean, model, first), model.turned(first), limit, tolerance)
         classes.append(shape)
         points = np.vstack([shape.corners, shape.inner])
-        for p in np.flatnonzero(stands == leader).tolist():
-            own = pieces[p].turned(int(turn[leader, p] + first) % len(model.vertices))
+        for p in members:
+            own = found.pieces[p].turned(first)
             placed[p] = MergedPiece(own.faces, index, own.vertices, own.inner)
             misfit[p] = misfits(points, own.points(mesh))
-    found = tuple(piece for piece in placed if piece is not None)
-    divided = _divided(decomposition, tuple(classes), found, spec)
-    return Patches(divided, merged=tuple(classes), pieces=found, misfit=read_only(misfit), allowance=tolerance)
+    pieces = tuple(piece for piece in placed if piece is not None)
+    divided = _divided(replace(decomposition, mesh=mesh), tuple(classes), pieces, spec)
+    return Patches(
+        divided,
+        merged=tuple(classes),
+        pieces=pieces,
+        misfit=read_only(misfit),
+        notes=_moved(decomposition.mesh, mesh),
+        allowance=tolerance,
+    )
 
 
-def _first_corner(mesh: TriMesh, piece: Outlined) -> int:
+def _moved(before: TriMesh, after: TriMesh) -> tuple[str, ...]:
+    moved = 100 * float(place(before).moved(after.vertices).max()) / before.mean_edge
+    if not moved:
+        return ()
+    return (f"Vertices left the surface by up to {moved:.1f} % of the mean edge so that more merged pieces are alike.",)
+
+
+def _turned(points: Floats, piece: Outlined, by: int) -> Floats:
+    """Corners and inner points with corner `by` first."""
+    count = len(piece.vertices)
+    return np.vstack([np.roll(points[:count], -by, axis=0), points[count:]])
+
+
+def _first_corner(corners: Floats) -> int:
     """The corner from which the sides, read round, come in the lowest order: the shortest side first."""
-    lengths = side_lengths(mesh.vertices[list(piece.vertices)])
+    lengths = side_lengths(corners)
     rounded = np.rint(lengths / (SAME_SIDE * lengths.max())).astype(np.int64)
     return min(range(len(rounded)), key=lambda by: tuple(np.roll(rounded, -by)))
 
@@ -60,19 +84,19 @@ def side_lengths(corners: Floats) -> Floats:
     return np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
 
 
-def _shape(mesh: TriMesh, piece: Outlined, flat_radians: float, tolerance: float) -> MergedClass:
-    """The piece in its part frame: origin amid its corners, z the mean normal, x along the first side."""
-    points, count = piece.points(mesh), len(piece.vertices)
-    corners = points[:count]
-    z = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
-    if len(piece.faces) == 1:
-        z = mesh.face_normals[piece.faces[0]]
-    z = z / np.linalg.norm(z)
+def _shape(points: Floats, piece: Outlined, flat_radians: float, tolerance: float) -> MergedClass:
+    """A piece of these points in its part frame: origin amid its corners, z the mean normal, x along the first side."""
+    count = len(piece.vertices)
+    corners, shell = points[:count], TriMesh(points, piece.triangles)
+    z = shell.face_normals[0]
+    if len(piece.faces) > 1:
+        z = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
+        z /= np.linalg.norm(z)
     x = corners[1] - corners[0]
     x = x - (x @ z) * z
     x /= np.linalg.norm(x)
     local = (points - corners.mean(axis=0)) @ np.stack([x, np.cross(z, x), z], axis=1)
-    if _sharpest(mesh, piece) <= flat_radians:
+    if _sharpest(shell) <= flat_radians:
         local[:, 2] = 0.0
     return MergedClass(
         read_only(local[:count].copy()),
@@ -83,10 +107,14 @@ def _shape(mesh: TriMesh, piece: Outlined, flat_radians: float, tolerance: float
     )
 
 
-def _sharpest(mesh: TriMesh, piece: Outlined) -> float:
+def _sharpest(shell: TriMesh) -> float:
     """The sharpest bend between two triangles of a piece, in radians."""
-    inside = np.isin(mesh.edge_faces, piece.faces).all(axis=1)
-    return float(np.abs(bend_radians(mesh)[inside]).max(initial=0.0))
+    normals = shell.face_normals
+    owner: dict[tuple[int, int], int] = {}
+    for face, row in enumerate(shell.faces.tolist()):
+        owner |= {(row[i], row[(i + 1) % 3]): face for i in range(3)}
+    pairs = [(face, owner[b, a]) for (a, b), face in owner.items() if (b, a) in owner]
+    return max((float(np.arccos(np.clip(normals[f] @ normals[g], -1, 1))) for f, g in pairs), default=0.0)
 
 
 def _divided(

@@ -11,7 +11,7 @@ from drkid.report.colouring import channels
 from drkid.report.drawing import Drawing, Shape, Word
 from drkid.report.guide import Guide, Instruction
 from drkid.report.hidden_surface import Painted, painted, triangulated
-from drkid.report.outline import outline
+from drkid.report.outline import creases, outline
 from drkid.report.picture import camera
 from drkid.report.rasteriser import rasterise
 
@@ -22,8 +22,29 @@ MOST_VIEWS = 4  # of one group
 LEAST_FACING = 0.3  # cosine to the eye below which a face is too oblique for words
 STANDING, STANDING_LINE, NEW_LINE = "#E4E6EA", "#8A8F99", "#000000"
 OUTER_COSINE = 0.99  # to the piece's normal: faces that are more oblique are its sides
+ON_SIDE = 1e-6  # of a face's size: points that are nearer to one of its sides lie on it
 STEEPEST = 80.0  # degrees of elevation
 DIRECTIONS = [(float(a), float(e)) for e in (-60, -20, 20, 60) for a in range(0, 360, 45)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Face:
+    """A polygon (n, 3) of a piece in view coordinates, and which of its sides are drawn (n,); `tone` is its brightness."""
+
+    piece: int
+    polygon: Floats
+    drawn: Bools
+    tone: float
+
+    def draws(self, part: Floats) -> list[bool]:
+        """For each side of a part of the polygon, into which it may be cut, whether it lies on a side that is drawn."""
+        start, along = self.polygon[self.drawn], (np.roll(self.polygon, -1, axis=0) - self.polygon)[self.drawn]
+        if not len(start):
+            return [False] * len(part)
+        ends = part[:, None] - start
+        across = np.linalg.norm(np.cross(ends, along), axis=-1) / np.linalg.norm(along, axis=-1)
+        near = across < ON_SIDE * float(np.ptp(self.polygon, axis=0).max())
+        return (near & np.roll(near, -1, axis=0)).any(axis=1).tolist()
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +56,10 @@ class Builder:
     @cached_property
     def _bodies(self) -> dict[str, tuple[Floats, ...]]:
         return {file: outline(mesh) for file, mesh in self.guide.scene.parts.items()}
+
+    @cached_property
+    def _creases(self) -> dict[str, tuple[Bools, ...]]:
+        return {file: creases(polygons) for file, polygons in self._bodies.items()}
 
     @cached_property
     def _size(self) -> float:
@@ -57,17 +82,30 @@ class Builder:
         return polygons, owner, np.array([_normal(p) for p in polygons])
 
     @cached_property
+    def _drawn(self) -> list[Bools]:
+        """Of each polygon of `_faces`, which of its sides are drawn (n,)."""
+        return [drawn for piece in self.guide.scene.document.pieces for drawn in self._creases[piece.part]]
+
+    @cached_property
     def _fans(self) -> tuple[Floats, Ints, Bools]:
         """(n, 3, 3): every piece's triangles in world coordinates, whose they are, and which are of an outer face."""
         polygons, owner, _ = self._faces
         corners, polygon = triangulated(polygons)
         piece = owner[polygon]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        outwards = np.einsum("nk,nk->n", normal, self.guide.scene.transforms[piece][:, :3, 2])
-        cosine = outwards / np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)
-        most = np.zeros(len(self._placed))  # 1 but for a bent piece, whose faces all lean
-        np.maximum.at(most, piece, cosine)
-        return corners, piece, cosine > OUTER_COSINE * most[piece]
+        outwards = np.einsum("nwk,nk->nw", self._outwards[piece], normal).max(axis=1)
+        return corners, piece, outwards > OUTER_COSINE * np.linalg.norm(normal, axis=1)
+
+    @cached_property
+    def _outwards(self) -> Floats:
+        """(P, w, 3): the outward normals of each piece: its own, or those of the faces that are merged in it."""
+        scene = self.guide.scene
+        covered = [piece.covered for piece in scene.document.pieces]
+        out = np.repeat(scene.transforms[:, None, :3, 2], max(map(len, covered)), axis=1)
+        for own, faces in zip(out, covered, strict=True):
+            if len(faces) > 1:
+                own[:] = scene.assembled.face_normals[np.resize(faces, len(own))]
+        return out
 
     @cached_property
     def _outer_area(self) -> Floats:
@@ -127,29 +165,40 @@ class Builder:
         new = {one.piece: one for one in group}
         asked = {join.other_step for one in group for join in one.joins}
         polygons, owner, normals = self._faces
-        facing = np.flatnonzero(np.isin(owner, standing) & (normals @ view[2] > 0))
-        found = painted([(polygons[i] - self.guide.scene.middle) @ view.T for i in facing], SAMPLES)
-        source = facing[found.source]
+        facing = np.flatnonzero(np.isin(owner, standing) & (normals @ view[2] > 0)).tolist()
+        tones = _tones(normals[facing] @ view.T).tolist()
+        middle = self.guide.scene.middle
+        faces = [
+            _Face(int(owner[i]), (polygons[i] - middle) @ view.T, self._drawn[i], tone)
+            for i, tone in zip(facing, tones, strict=True)
+        ]
+        found = painted([face.polygon for face in faces], SAMPLES)
         low, high = self._box(standing, view)
         scale = min(width / (high - low)[0], height / (high - low)[1]) * 0.97
         size = (high - low) * scale
         sheet = np.array([size[0], size[1]]) * 1.02
         shift = sheet / 2 - (low + high) / 2 * scale
-        items = self._shapes(found, owner[source], _tones(normals[source] @ view.T), set(new), (scale, shift))
+        items = self._shapes(found, faces, set(new), scale, shift)
         words = self._words(standing, new, asked, view, (scale, shift))
         title = f"Steps {group[0].step} to {group[-1].step}: what stands, the new pieces coloured"
         return Drawing(float(sheet[0]), float(sheet[1]), (*items, *words), title)
 
-    def _shapes(
-        self, found: Painted, owner: Ints, tones: Floats, new: set[int], placing: tuple[float, Floats]
-    ) -> list[Shape]:
+    def _shapes(self, found: Painted, faces: list[_Face], new: set[int], scale: float, shift: Floats) -> list[Shape]:
+        """Faces and their creases; those without a crease are closed by a line of their own colour."""
         shapes: list[Shape] = []
-        scale, shift = placing
-        for polygon, piece, tone in zip(found.polygons, owner.tolist(), tones.tolist(), strict=True):
-            code = class_colour(int(self.guide.scene.piece_class[piece])) if piece in new else STANDING
-            fill = _shaded(code, tone if piece not in new else 0.55 + 0.45 * tone)
-            line = NEW_LINE if piece in new else STANDING_LINE
-            shapes.append(Shape(polygon[:, :2] * scale + shift, fill, line, 0.35 if piece in new else 0.15))
+        for polygon, source in zip(found.polygons, found.source.tolist(), strict=True):
+            face = faces[source]
+            own = face.piece in new
+            code = class_colour(int(self.guide.scene.piece_class[face.piece])) if own else STANDING
+            fill = _shaded(code, 0.55 + 0.45 * face.tone if own else face.tone)
+            line, width = (NEW_LINE, 0.35) if own else (STANDING_LINE, 0.15)
+            flat = polygon[:, :2] * scale + shift
+            if face.drawn.all() and len(polygon) == len(face.polygon):
+                shapes.append(Shape(flat, fill, line, width))
+                continue
+            shapes.append(Shape(flat, fill, fill, 0.15))
+            sides = zip(flat, np.roll(flat, -1, axis=0), face.draws(polygon), strict=True)
+            shapes += [Shape(np.stack([a, b]), None, line, width) for a, b, drawn in sides if drawn]
         return shapes
 
     def _words(
