@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import igl
 import numpy as np
-from scipy.sparse import coo_array, csr_array, diags_array
+from scipy.sparse import coo_array, diags_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.sparse.linalg import cg
 
@@ -85,8 +85,8 @@ def curvature(surface: TriMesh, radius: float) -> Floats:
     for end in range(2):
         np.add.at(tensor, surface.edges[:, end], bent[:, None] * along[:, rows] * along[:, columns])
     mass = np.bincount(surface.faces.ravel(), np.repeat(surface.areas / 3, 3), minlength=len(surface.vertices))
-    stiffness = csr_array(-igl.cotmatrix(surface.vertices, surface.faces))
-    system = (diags_array(mass) + stiffness * (radius**2 / 2)).tocsr()
+    cotangents = igl.cotmatrix(surface.vertices, surface.faces)
+    system = (diags_array(mass) - cotangents * (radius**2 / 2)).tocsr()
     jacobi = diags_array(1 / system.diagonal())
     smooth = np.column_stack([cg(system, tensor[:, k], rtol=PRECISION, M=jacobi)[0] for k in range(6)])
     return np.sqrt((smooth**2 * np.where(rows == columns, 1, 2)).sum(axis=1))

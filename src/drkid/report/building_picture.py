@@ -29,7 +29,7 @@ DIRECTIONS = [(float(a), float(e)) for e in (-60, -20, 20, 60) for a in range(0,
 
 @dataclass(frozen=True, eq=False)
 class _Face:
-    """A polygon (n, 3) of a piece in view coordinates, and which of its sides are drawn (n,); `tone` is its brightness."""
+    """A polygon (n, 3) of a piece in view coordinates, which of its sides are drawn (n,), and its brightness."""
 
     piece: int
     polygon: Floats
