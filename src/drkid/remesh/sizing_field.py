@@ -85,10 +85,10 @@ def curvature(surface: TriMesh, radius: float) -> Floats:
     for end in range(2):
         np.add.at(tensor, surface.edges[:, end], bent[:, None] * along[:, rows] * along[:, columns])
     mass = np.bincount(surface.faces.ravel(), np.repeat(surface.areas / 3, 3), minlength=len(surface.vertices))
-    cotangents = igl.cotmatrix(surface.vertices, surface.faces)
-    system = (diags_array(mass) - cotangents.multiply(radius**2 / 2)).tocsr()
+    per_area = 2 / radius**2
+    system = (diags_array(mass * per_area) - igl.cotmatrix(surface.vertices, surface.faces)).tocsr()
     jacobi = diags_array(1 / system.diagonal())
-    smooth = np.column_stack([cg(system, tensor[:, k], rtol=PRECISION, M=jacobi)[0] for k in range(6)])
+    smooth = np.column_stack([cg(system, per_area * tensor[:, k], rtol=PRECISION, M=jacobi)[0] for k in range(6)])
     return np.sqrt((smooth**2 * np.where(rows == columns, 1, 2)).sum(axis=1))
 
 
