@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import igl
 import numpy as np
-from scipy.sparse import coo_array, diags_array
+from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.sparse.linalg import cg
 
@@ -86,7 +86,7 @@ def curvature(surface: TriMesh, radius: float) -> Floats:
         np.add.at(tensor, surface.edges[:, end], bent[:, None] * along[:, rows] * along[:, columns])
     mass = np.bincount(surface.faces.ravel(), np.repeat(surface.areas / 3, 3), minlength=len(surface.vertices))
     per_area = 2 / radius**2
-    system = (diags_array(mass * per_area) - igl.cotmatrix(surface.vertices, surface.faces)).tocsr()
+    system = csr_array(diags_array(mass * per_area) - igl.cotmatrix(surface.vertices, surface.faces))
     jacobi = diags_array(1 / system.diagonal())
     smooth = np.column_stack([cg(system, per_area * tensor[:, k], rtol=PRECISION, M=jacobi)[0] for k in range(6)])
     return np.sqrt((smooth**2 * np.where(rows == columns, 1, 2)).sum(axis=1))
