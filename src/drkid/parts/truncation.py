@@ -141,6 +141,8 @@ class _Shell:
     def margins(self, cuts: Floats, wanted: float, pairs: Ints | int | slice = slice(None)) -> Floats:
         """(n,): the sine of the angle that the best plane leaves on either side of it, up to `wanted`."""
         pairs = np.atleast_1d(np.arange(len(self.vertex))[pairs])
+        if not len(pairs):
+            return np.empty(0)
         faces = self.faces[pairs]
         own, shape = np.unique(self.face_class[faces], return_inverse=True)
         points = np.stack([self.shapes[k].truncated(cuts[k]).points for k in own])
