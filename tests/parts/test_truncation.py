@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 import trimesh
-from exact_shapes import decomposed
+from exact_shapes import decomposed, tetrahedron
 
 from drkid.assembly import assemble
 from drkid.assembly.overlap import overlaps
@@ -46,6 +46,10 @@ def test_pieces_for_every_shape_keep_their_corners() -> None:
     for choice in ({"bevel_degrees": (100.0, 120.0)}, {"thickening": "perpendicular"}):
         parts = make_parts(d, KitSpec(connector="none", **choice))
         assert (parts.cut_corners, parts.deepest_cut_mm) == (0, 0.0)
+
+
+def test_where_all_pieces_are_neighbours_nothing_is_cut() -> None:
+    assert make_parts(decomposed(tetrahedron()), KitSpec(connector="none")).cut_corners == 0
 
 
 def test_a_cut_lies_as_far_behind_the_corner_as_it_says() -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from math import floor, radians, sin
 
 import numpy as np
@@ -55,6 +55,7 @@ def truncated(
     and so are both faces of a flippable one. No cut lies more than `room_mm(class, face, corner)` behind its corner;
     where even that is not enough for a swing, no more is cut than for pieces at rest.
     """
+    room_mm = cache(room_mm)
     shell, cuts = _Shell(shapes, triangles, members, mesh_mm), np.zeros((len(shapes), 2, 3))
     wanted = sin(radians(spec.swing_degrees / 2))
     near = np.flatnonzero(shell.margins(cuts, wanted) < wanted)
@@ -62,6 +63,8 @@ def truncated(
         return Truncated(shapes)
     alike, both = np.stack([_alike(t) for t in triangles]), spec.thickening == "flippable"
     for pair in near.tolist():
+        if shell.margins(cuts, wanted, pair)[0] >= wanted:
+            continue
         room = shell.room(pair, room_mm)
         most = shell.margins(_shared(room, alike, both_faces=both), wanted, pair)[0]
         enough = wanted if most >= wanted else AT_REST
@@ -137,10 +140,13 @@ class _Shell:
 
     def margins(self, cuts: Floats, wanted: float, pairs: Ints | int | slice = slice(None)) -> Floats:
         """(n,): the sine of the angle that the best plane leaves on either side of it, up to `wanted`."""
-        points = np.stack([s.truncated(cut).points for s, cut in zip(self.shapes, cuts, strict=True)])
         pairs = np.atleast_1d(np.arange(len(self.vertex))[pairs])
+        if not len(pairs):
+            return np.empty(0)
         faces = self.faces[pairs]
-        placed = np.einsum("nsab,nspb->nspa", self.rotations[faces], points[self.face_class[faces]])
+        own, shape = np.unique(self.face_class[faces], return_inverse=True)
+        points = np.stack([self.shapes[k].truncated(cuts[k]).points for k in own])
+        placed = np.einsum("nsab,nspb->nspa", self.rotations[faces], points[shape.reshape(faces.shape)])
         away = placed + (self.motions[faces, :3, 3] - self.vertices[self.vertex[pairs]][:, None])[:, :, None]
         away[:, 1] *= -1
         away = away.reshape(len(away), -1, 3)
