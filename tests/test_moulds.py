@@ -94,7 +94,7 @@ def test_a_size_chooses_the_number_of_pieces(potato_file, pair_kit):
 def test_faces_and_size_that_disagree_are_refused_before_the_search(potato_file):
     seen: list[str] = []
     spec = FEW.model_copy(update={"size_mm": 300.0})
-    with pytest.raises(SpecError, match="40 pieces with edges of 34 and 39") as caught:
+    with pytest.raises(SpecError, match="40 pieces with edges of 35 and 41") as caught:
         make_kit(potato_file, spec, lambda stage, *_: seen.append(stage))
     assert "congruence" not in seen
     assert "40 faces" in caught.value.found
