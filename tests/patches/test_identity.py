@@ -85,3 +85,15 @@ def test_shapes_stand_within_the_tolerance() -> None:
     stands = shapes(apart, 1.0)
     assert len(np.unique(stands)) == 2
     assert (apart[np.arange(4), stands] <= 1.0).all()
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1.0])
+def test_a_piece_always_stands_for_itself(tolerance) -> None:
+    assert shapes(np.full((3, 3), 0.5), tolerance).tolist() == [0, 1, 2]
+
+
+def test_a_piece_fits_itself_exactly() -> None:
+    mesh = fan(6, 1)
+    least, turn = both(mesh, mesh)
+    assert np.diagonal(least).tolist() == [0.0, 0.0]
+    assert np.diagonal(turn).tolist() == [0, 0]

@@ -61,8 +61,15 @@ def test_an_icosahedron_merges_into_one_shape() -> None:
             assert len(found.merged) < len(found.pieces)
 
 
-def test_a_looser_tolerance_needs_no_more_shapes(pebble) -> None:
-    counts = [len(merged_patches(one_class(pebble), KitSpec(merge=2), t).merged) for t in (1e-6, 0.3)]
+@pytest.mark.parametrize("tolerance", [0.0, 1e-6])
+def test_without_a_tolerance_every_face_is_paired_too(tolerance) -> None:
+    pairs = paired(icosahedron(), tolerance)
+    assert Counter(map(len, pairs)) == {2: 10}
+
+
+def test_a_looser_tolerance_needs_fewer_shapes(pebble) -> None:
+    as_it_is = KitSpec(merge=2, merge_shift_percent=0)
+    counts = [len(merged_patches(one_class(pebble), as_it_is, t).merged) for t in (1e-6, 0.3)]
     assert counts[0] > counts[1]
 
 
@@ -78,8 +85,9 @@ def test_corners_lie_within_the_tolerance_of_their_shape(pebble) -> None:
 
 
 def test_gently_bent_pieces_are_made_flat(pebble) -> None:
-    bent = merged_patches(one_class(pebble), KitSpec(merge=2), 0.01)
-    flat = merged_patches(one_class(pebble), KitSpec(merge=2, merge_flat_degrees=45), 0.01)
+    as_it_is = KitSpec(merge=2, merge_shift_percent=0)
+    bent = merged_patches(one_class(pebble), as_it_is, 0.01)
+    flat = merged_patches(one_class(pebble), as_it_is.model_copy(update={"merge_flat_degrees": 45.0}), 0.01)
     assert max(np.abs(c.corners[:, 2]).max() for c in bent.merged) > 1e-3
     assert max(np.abs(c.corners[:, 2]).max() for c in flat.merged) < 1e-12
     assert flat.misfit is not None

@@ -13,7 +13,7 @@ from drkid.class_triangle import inward_normals
 from drkid.curved_patch import CurvedPatch, barycentric_grid
 from drkid.kit import Dimensions
 from drkid.mesh import Floats, TriMesh
-from drkid.parts.pocket import side_frames
+from drkid.parts.pocket import deepest_height_mm, depth_mm, flare_mm, side_frames
 from drkid.parts.prismoid import Prismoid, bevelled
 from drkid.solid import Solid
 
@@ -51,7 +51,8 @@ def needed_thickness_mm(triangle: Floats, patch: CurvedPatch, dimensions: Dimens
     if d.connector == "none":
         return 0.0
     wall = d.min_wall_mm
-    x = np.linspace(-d.pocket_width_mm / 2 - wall, d.pocket_width_mm / 2 + wall, FOOTPRINT_POINTS)
+    half = _half_housing_mm(d)
+    x = np.linspace(-half, half, FOOTPRINT_POINTS)
     y = np.linspace(0.0, d.pocket_depth_mm + wall, FOOTPRINT_POINTS)
     local = np.stack([*np.meshgrid(x, y), np.zeros((len(y), len(x))), np.ones((len(y), len(x)))], axis=-1)
     points = np.einsum("sij,yxj->syxi", side_frames(triangle, dimensions.key_bend_degrees / 2), local)[..., :2].reshape(
@@ -79,8 +80,13 @@ def curved_solid(
 def _housing(dimensions: Dimensions) -> Solid:
     """The walls of a pocket down to where the inner face of a flat piece would be, in connector coordinates."""
     d = dimensions
-    half, floor = d.pocket_width_mm / 2 + d.min_wall_mm, d.pocket_depth_mm + d.min_wall_mm
+    half, floor = _half_housing_mm(d), depth_mm(d, deepest_height_mm(d)) + d.min_wall_mm
     return Solid.box((-half, -d.thickness_mm, -d.thickness_mm / 2), (half, floor, d.pocket_height_mm / 2))
+
+
+def _half_housing_mm(d: Dimensions) -> float:
+    """Half the width of a housing: a wall behind the grooves, where the pocket is widest."""
+    return d.pocket_width_mm / 2 + flare_mm(d, -d.thickness_mm / 2) + d.detent_mm + d.min_wall_mm
 
 
 def shell_mesh(triangle: Floats, patch: CurvedPatch, prismoid: Prismoid, levels: int) -> TriMesh:

@@ -41,7 +41,7 @@ WHOLE_MM = 1e-6
 MOST_OF_SIDE = 0.4  # of the shortest side: how wide a pocket may be that is proposed for its strength
 ROUNDING_ROOM = 1.005  # lengths rounded up to tenths of a mm make triangles of a slightly other shape
 SMALLER = 1 - 1e-4  # of a scale: what another connector must save to be taken
-MOST_THICKENINGS = 12  # of curved pieces, each of which may need a larger size; two or three do
+MOST_THICKENINGS = 60  # each may need a larger size; two or three do, unless joints are very sharp
 MOST_BEVEL_OF_REACH = 0.5  # of a connector's reach: what the bevels of curved pieces may leave without walls
 
 
@@ -217,7 +217,7 @@ def _scaled(design: _Design) -> tuple[_Design, float]:
     """The scale, and the design with pieces as thick as curved patches need at it: they dip more the larger they are.
 
     Raises:
-        FitError: a thickness is given that is less.
+        FitError: a thickness is given that is less, or bevels so wide that no size is enough.
     """
     for _ in range(MOST_THICKENINGS):
         scale, dimensions = _scale(design), design.dimensions
@@ -225,14 +225,20 @@ def _scaled(design: _Design) -> tuple[_Design, float]:
         if max(thickness - dimensions.thickness_mm, depth - dimensions.pocket_depth_mm) <= WHOLE_MM:
             return design, scale
         if thickness > dimensions.thickness_mm and design.spec.thickness_mm is not None:
-            break
+            raise FitError(
+                "the curved patches dip so far under their triangles that the pockets would lose their roof",
+                wanted=f"thickness_mm of {thickness:.2f} at least",
+                found=f"{dimensions.thickness_mm:g}",
+                remedy="thicker pieces (--thickness-mm), fewer --curved-classes, or --patch flat",
+            )
         thickness, depth = max(thickness, dimensions.thickness_mm), max(depth, dimensions.pocket_depth_mm)
         design = replace(design, dimensions=replace(dimensions, thickness_mm=thickness, pocket_depth_mm=depth))
+    dimensions, sharpest = design.dimensions, np.degrees(np.abs(design.members.bend_radians).max())
     raise FitError(
-        "the curved patches dip so far under their triangles that the pockets would lose their roof",
-        wanted=f"thickness_mm of {design.needed_thickness_mm(_scale(design)):.2f} at least",
-        found=f"{design.dimensions.thickness_mm:g}",
-        remedy="thicker pieces (--thickness-mm), fewer --curved-classes, or --patch flat",
+        "no size is found at which the bevels of curved or merged pieces leave enough of their pockets",
+        wanted=f"pockets {dimensions.pocket_depth_mm:g} mm deep in pieces {dimensions.thickness_mm:g} mm thick",
+        found=f"joints that bend by up to {sharpest:.0f}°",
+        remedy="more pieces (--faces), a given --size-mm, or --patch flat",
     )
 
 

@@ -1,27 +1,36 @@
 """Parts of merged pieces: at the size and with the dimensions at which the triangles themselves would fit."""
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
-from drkid.kit import Dimensions, Handedness, MergedClass, MergedPiece, Part, PartSet, Patches
+from drkid.kit import Dimensions, Handedness, MergedClass, MergedPiece, Part, PartSet, Patches, class_id
 from drkid.measure import bend_radians
 from drkid.mesh import Floats, TriMesh, read_only
 from drkid.parts.bevel import bevel_insets, flippable_insets
 from drkid.parts.dimensions import deepest_bevel_mm
-from drkid.parts.merged_piece import demanded, merged_solid, outline_bends, outline_frames, shared_insets
+from drkid.parts.merged_piece import (
+    bevel_planes,
+    demanded,
+    merged_solid,
+    outline_bends,
+    outline_frames,
+    shared_insets,
+)
 from drkid.parts.pocket import pocket
 from drkid.spec import FOLLOWING, KitSpec
 
+THIN_OF_WALL = 0.95  # of the wanted wall: thinner ones are told
 MOST_MIDDLE_INSET = 0.45  # of the thickness: how far a side may stand back from the hinge axis at mid-height
 
 
 def merged_parts(patches: Patches, of_triangles: PartSet, spec: KitSpec, notes: tuple[str, ...] = ()) -> PartSet:
     """The part set of merged pieces, from that of the same triangles unmerged.
 
-    Every triangle of a piece keeps its pockets on the outline, and a piece has no pocket that its triangles did not
-    have room for: what fits unmerged fits merged. What was found of single triangles' walls and bevels is left out;
-    `notes` take the place of theirs.
+    Every triangle of a piece keeps its pockets on the outline. Triangles that were made alike may lack room for them:
+    a note tells which shapes have walls that are too thin. What was found of single triangles' walls and bevels is
+    left out; `notes` take the place of theirs.
     """
     scale, dimensions = of_triangles.scale_mm_per_unit, of_triangles.dimensions
     mesh_mm = patches.decomposition.mesh.scaled(scale)
@@ -37,7 +46,7 @@ def merged_parts(patches: Patches, of_triangles: PartSet, spec: KitSpec, notes: 
         face_part=read_only(face_part),
         face_turn=read_only(np.zeros(len(face_part), np.int64)),
         groove_mm=read_only(_grooves(mesh_mm, patches.pieces, insets, dimensions)),
-        notes=notes,
+        notes=(*notes, *_wall_notes(shapes, insets, dimensions)),
         findings=tuple(finding for finding in of_triangles.findings if not finding.subject.startswith("class ")),
         groove_choices=(),
         merged=patches.pieces,
@@ -52,6 +61,34 @@ def merged_insets(patches: Patches, scale: float, dimensions: Dimensions, spec: 
         members[piece.class_index].append(piece)
     zipped = zip(patches.merged, members, strict=True)
     return [_insets(mesh_mm, _scaled(shape, scale), own, dimensions, spec) for shape, own in zipped]
+
+
+def _wall_notes(shapes: tuple[MergedClass, ...], insets: list[Floats], dimensions: Dimensions) -> list[str]:
+    walls = [_wall_mm(shape, inset, dimensions) for shape, inset in zip(shapes, insets, strict=True)]
+    thin = [class_id(k) for k, wall in enumerate(walls) if wall < THIN_OF_WALL * dimensions.min_wall_mm]
+    if not thin:
+        return []
+    return [
+        f"Pockets of class {', '.join(thin)} have walls of {max(min(walls), 0):.2f} mm, less than the "
+        f"{dimensions.min_wall_mm:g} mm that are wanted; --merge-shift-percent 0 and --merge 2 merge more gently."
+    ]
+
+
+def _wall_mm(shape: MergedClass, insets: Floats, dimensions: Dimensions) -> float:
+    """The thinnest wall between two pockets, or a pocket and another side's bevel; `min_wall_mm` where it is more."""
+    thinnest = dimensions.min_wall_mm
+    if dimensions.connector == "none":
+        return thinnest
+    body = merged_solid(shape, insets, dimensions.thickness_mm)
+    frames = outline_frames(shape, dimensions.key_bend_degrees / 2)
+    pockets = [body & pocket(dimensions).moved(frame) for frame in frames]
+    between = [one.gap(other, thinnest) for one, other in combinations(pockets, 2)]
+    normals, levels = bevel_planes(shape, insets, dimensions.thickness_mm)
+    behind = [
+        float((one.mesh().vertices @ np.delete(normals, i, axis=0).T - np.delete(levels, i)).min())
+        for i, one in enumerate(pockets)
+    ]
+    return min(thinnest, *between, *behind)
 
 
 def _scaled(shape: MergedClass, scale: float) -> MergedClass:

@@ -72,15 +72,21 @@ def merged_solid(shape: MergedClass, insets_mm: Floats, thickness_mm: float) -> 
     `insets_mm` (2, n) are those of the sides at the inner and the outer face. A bevel's plane cuts the whole piece,
     which is what a convex outline allows.
     """
+    skirt = max(-float(insets_mm.min()), 0.0) + SKIRT_MM
+    solid = Solid.of(slab_mesh(shape, skirt, thickness_mm))
+    for normal, level in zip(*bevel_planes(shape, insets_mm, thickness_mm), strict=True):
+        solid = solid.beyond(normal, float(level))
+    return solid
+
+
+def bevel_planes(shape: MergedClass, insets_mm: Floats, thickness_mm: float) -> tuple[Floats, Floats]:
+    """Unit normals (n, 3) and levels (n,): the piece lies where normal·p is more than the level of every side."""
     frames = outline_frames(shape)
     slope = (insets_mm[1] - insets_mm[0]) / thickness_mm
     normals = frames[:, :3, 1] - slope[:, None] * frames[:, :3, 2]
     levels = np.einsum("sk,sk->s", normals, frames[:, :3, 3]) + insets_mm.mean(axis=0)
-    skirt = max(-float(insets_mm.min()), 0.0) + SKIRT_MM
-    solid = Solid.of(slab_mesh(shape, skirt, thickness_mm))
-    for normal, level in zip(normals, levels, strict=True):
-        solid = solid.beyond(normal, float(level))
-    return solid
+    length = np.linalg.norm(normals, axis=1)
+    return normals / length[:, None], levels / length
 
 
 def slab_mesh(shape: MergedClass, skirt_mm: float, thickness_mm: float) -> TriMesh:

@@ -44,6 +44,8 @@ def residuals(mesh: TriMesh, pieces: list[Outlined]) -> tuple[Floats, Ints]:
             least[rows, columns] = np.where(better, found, least[rows, columns])
             relative = (start[None] + by - start[:, None]) % len(first.vertices)
             turn[rows, columns] = np.where(better, relative, turn[rows, columns])
+    np.fill_diagonal(least, 0.0)
+    np.fill_diagonal(turn, 0)
     return least, turn
 
 
@@ -57,8 +59,8 @@ def built_alike(pieces: list[Outlined]) -> list[list[int]]:
 
 
 def shapes(residual: Floats, tolerance: float) -> Ints:
-    """(P,): the piece that stands for each piece, within the tolerance of it; as few as greedy covering finds."""
-    near = residual <= tolerance
+    """(P,): the piece that stands for each piece, within the tolerance of it or itself; few, by greedy covering."""
+    near = (residual <= tolerance) | np.eye(len(residual), dtype=bool)
     stands = np.full(len(residual), -1, np.int64)
     while (open_ := stands < 0).any():
         leader = int(np.argmax((near & open_[None]).sum(axis=1) * open_))

@@ -93,8 +93,12 @@ class Builder:
         corners, polygon = triangulated(polygons)
         piece = owner[polygon]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        length = np.linalg.norm(normal, axis=1)
         outwards = np.einsum("nwk,nk->nw", self._outwards[piece], normal).max(axis=1)
-        return corners, piece, outwards > OUTER_COSINE * np.linalg.norm(normal, axis=1)
+        cosine = np.divide(outwards, length, out=np.full(len(length), -1.0), where=length > 0)
+        most = np.full(len(self._placed), -1.0)
+        np.maximum.at(most, piece, cosine)  # of a strongly curved piece no face may be within the limit
+        return corners, piece, cosine >= np.minimum(OUTER_COSINE, most[piece])
 
     @cached_property
     def _outwards(self) -> Floats:
