@@ -67,7 +67,8 @@ def test_volumes_come_out_as_one_sound_mesh(make):
         assert any(words in note for note in surface.notes)
     check(simplify(surface, KitSpec(vertices=150)).mesh, surface.mesh, 150)
     solid = mask if make is not debris_and_cavity else ball()
-    assert surface.mesh.volume == pytest.approx(solid.sum() * np.prod(spacing), rel=0.05)
+    mean_shift = (surface.mesh.volume - solid.sum() * np.prod(spacing)) / surface.mesh.areas.sum()
+    assert abs(mean_shift) < 0.1 * max(spacing)
 
 
 def tube(length: float, radius: float) -> TriMesh:
@@ -95,7 +96,8 @@ def test_a_handful_of_vertices_is_still_a_closed_mesh(potato, vertices):
     assert len(found.vertices) == vertices
     assert found.is_closed_manifold
     assert (found.genus, found.component_count) == (0, 1)
-    assert 0.2 * potato.volume < found.volume < 1.3 * potato.volume
+    inscribed = 8 / (9 * np.sqrt(3)) / (4 / 3 * np.pi)  # of a ball's volume, by the regular tetrahedron
+    assert inscribed * potato.volume < found.volume < 1.3 * potato.volume
 
 
 def test_handles_that_are_noise_leave_a_ring_that_can_be_built():
