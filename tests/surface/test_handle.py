@@ -72,6 +72,18 @@ def test_the_wide_ring_is_kept_and_the_narrow_tunnel_closed():
     assert both[1].way == "cut"
 
 
+def test_of_three_handles_the_wide_ring_outlasts_a_bore_and_a_wire():
+    mask = noisy_ring()
+    mask[11:29, 22, 8] = True
+    assert genus(mask) == 3
+    found, closed = without_handles(mask, 1, UNIT)
+    assert genus(found) == 1
+    assert {one.way for one in closed} == {"filled", "cut"}
+    assert all(one.voxels < 10 for one in closed)  # the ring itself takes about fifty
+    assert not found[16:24, 12:19, :].any()
+    assert (found != mask).sum() < 60
+
+
 def test_what_has_few_enough_handles_is_left_alone():
     for mask, most in ((np.pad(ball(), 2), 0), (noisy_ring(), 2), (noisy_ring(), 5)):
         found, closed = without_handles(mask, most, UNIT)
