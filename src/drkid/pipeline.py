@@ -8,6 +8,7 @@ from pathlib import Path
 
 from drkid.assembly import assemble
 from drkid.congruence import decompose
+from drkid.congruence.softest_mode import rigidity
 from drkid.data import nucleus_path
 from drkid.export import write_kit
 from drkid.formats import is_mesh_path
@@ -63,7 +64,7 @@ def make_kit(source: str | Path | None = None, spec: KitSpec | None = None, prog
     with stage("patches") as told:
         patches = make_patches(decomposition, surface.mesh, spec, told)
     triangles = decomposition
-    decomposition = decomposition if patches is None else patches.decomposition
+    decomposition = decomposition if patches is None else _as_stiff_as_moved(patches.decomposition, triangles)
     unmerged = triangles if spec.merge else decomposition
     with stage("parts") as told:
         part_set = make_parts(unmerged, spec, told, patches)
@@ -149,6 +150,13 @@ def _scaled(decomposition: Decomposition, scale: float) -> Decomposition:
 def _crossings(decomposition: Decomposition) -> tuple[str, ...]:
     count = len(self_intersections(decomposition.mesh))
     return (f"{count} pairs of faces of the assembled surface cut each other: take more faces",) if count else ()
+
+
+def _as_stiff_as_moved(found: Decomposition, before: Decomposition) -> Decomposition:
+    """The rigidity of the mesh as it is, where merging has moved its vertices."""
+    if found.rigidity is None or (found.mesh.vertices == before.mesh.vertices).all():
+        return found
+    return replace(found, rigidity=rigidity(found.mesh))
 
 
 def _resolved(spec: KitSpec, surface: Surface, unmerged: Decomposition, part_set: PartSet) -> KitSpec:

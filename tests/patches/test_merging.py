@@ -50,7 +50,7 @@ def test_stars_are_disjoint_whole_or_convex_parts(pebble, size) -> None:
 
 def test_an_icosahedron_merges_into_one_shape() -> None:
     for merge, pieces in ((2, 10), (5, 8)):
-        found = merged_patches(one_class(icosahedron()), KitSpec(merge=merge), 1e-6)
+        found = merged_patches(one_class(icosahedron()), KitSpec(merge=merge, merge_shift_percent=5), 1e-6)
         assert found.misfit == pytest.approx(np.zeros(len(found.pieces)), abs=1e-9)
         if merge == 2:
             assert len(found.pieces) == pieces
@@ -75,7 +75,7 @@ def test_a_looser_tolerance_needs_fewer_shapes(pebble) -> None:
 
 def test_corners_lie_within_the_tolerance_of_their_shape(pebble) -> None:
     tolerance = 0.1
-    found = merged_patches(one_class(pebble), KitSpec(merge=6), tolerance)
+    found = merged_patches(one_class(pebble), KitSpec(merge=6, merge_shift_percent=5), tolerance)
     assert found.misfit is not None
     assert found.misfit.max() <= tolerance + 1e-9
     lengths = found.decomposition.class_lengths
