@@ -32,8 +32,8 @@ LIMITS: tuple[Limits, ...] = ((0.5, -0.2, 4.0, 8.0), (0.2, -0.5, 4.0, 9.0), (0.0
 
 
 @njit(cache=True)
-def _keeps_the_topology(origin: Ints, twin: Ints, start: Ints, h: int) -> bool:
-    # The link condition on a closed surface: the ends of the edge have only the two wings in common.
+def keeps_the_topology(origin: Ints, twin: Ints, start: Ints, h: int) -> bool:
+    """The link condition on a closed surface: the ends of h's edge have only the two wings in common."""
     b, c, d = origin[twin[h]], origin[preceding(h)], origin[preceding(twin[h])]
     g = start[origin[h]]
     end = g
@@ -109,7 +109,7 @@ def _collapse_round(
         if len(done) == budget:
             break
         a, b = origin[h], origin[twin[h]]
-        if a < 0 or waiting[a] or waiting[b] or not _keeps_the_topology(origin, twin, start, h):
+        if a < 0 or waiting[a] or waiting[b] or not keeps_the_topology(origin, twin, start, h):
             continue
         if _keeps_the_shape(origin, twin, start, vertices, h, limits):
             _mark_neighbours(origin, twin, start[a], waiting)

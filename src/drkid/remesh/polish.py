@@ -1,12 +1,14 @@
 """Polish: valences, edges and distances made better in turn, at a constant number of vertices.
 
 Flips let irregular vertices meet and vanish (`dislocation_glide`), least squares then place all vertices
-(`surface_fit`); each makes room for the other.
+(`surface_fit`); each makes room for the other. Flaws that are left then are mended by pairs of collapses and splits
+(`collapse_and_split`); a mesh without any stays as it is.
 """
 
 import numpy as np
 
 from drkid.mesh import TriMesh
+from drkid.remesh.collapse_and_split import collapsed_and_split
 from drkid.remesh.dislocation_glide import glide
 from drkid.remesh.surface_fit import SurfaceFit
 
@@ -27,4 +29,4 @@ def polished(mesh: TriMesh, fit: SurfaceFit, rng: np.random.Generator) -> TriMes
             mesh = fit.stepped(mesh)
     for _ in range(LAST_STEPS):
         mesh = fit.stepped(mesh)
-    return mesh
+    return collapsed_and_split(mesh, fit)
