@@ -66,7 +66,7 @@ def test_threads_change_no_bit_of_the_cells(blob, guess):
     fine = subdivided(blob, 2 * CHUNK)
     seeds = seeds_on(fine, 300)
     first = tessellate(fine, seeds).first if guess else None
-    one, two, four = (tessellate(fine, seeds + 1e-3, first, threads) for threads in (1, 2, 4))
+    one, two, four = (tessellate(fine, seeds + 1e-3, first, threads=threads) for threads in (1, 2, 4))
     assert len(fine.faces) > 2 * CHUNK
     for other in (two, four):
         assert all(np.array_equal(a, b) for a, b in zip(vars(one).values(), vars(other).values(), strict=True))
@@ -77,7 +77,7 @@ def test_chunks_change_the_sums_by_rounding_alone(blob):
     seeds = seeds_on(fine, 300)
     parts = [tessellate(fine.submesh(part), seeds) for part in np.array_split(np.arange(len(fine.faces)), 7)]
     cells = tessellate(fine, seeds)
-    assert np.allclose(sum(part.area for part in parts), cells.area, rtol=1e-12)
+    assert np.allclose(sum(part.mass for part in parts), cells.mass, rtol=1e-12)
     assert np.allclose(sum(part.energy for part in parts), cells.energy, rtol=1e-12)
     assert np.array_equal(cells.first, cKDTree(seeds).query(fine.middles)[1])
 
