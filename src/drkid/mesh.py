@@ -15,7 +15,7 @@ Bools = NDArray[np.bool_]
 Scalar = TypeVar("Scalar", bound=np.generic)
 _TOPOLOGY = (
     *("half_edges", "_edges_and_sides", "edge_faces", "valence", "open_edges", "misoriented_edges"),
-    *("pinched_vertices", "is_closed_manifold", "face_component", "euler_characteristic"),
+    *("pinched_vertices", "is_closed_manifold", "face_component", "used_vertices", "euler_characteristic"),
 )
 
 

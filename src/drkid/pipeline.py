@@ -8,7 +8,7 @@ from pathlib import Path
 
 from drkid.assembly import assemble
 from drkid.congruence import decompose
-from drkid.congruence.softest_mode import rigidity
+from drkid.congruence.decompose import rigidity_of
 from drkid.data import nucleus_path
 from drkid.export import write_kit
 from drkid.formats import is_mesh_path
@@ -156,7 +156,7 @@ def _as_stiff_as_moved(found: Decomposition, before: Decomposition) -> Decomposi
     """The rigidity of the mesh as it is, where merging has moved its vertices."""
     if found.rigidity is None or (found.mesh.vertices == before.mesh.vertices).all():
         return found
-    return replace(found, rigidity=rigidity(found.mesh))
+    return replace(found, rigidity=rigidity_of(found.mesh))
 
 
 def _resolved(spec: KitSpec, surface: Surface, unmerged: Decomposition, part_set: PartSet) -> KitSpec:

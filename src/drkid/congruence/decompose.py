@@ -65,12 +65,12 @@ def _tidied(solution: Solution, spec: KitSpec) -> Decomposition:
         convergence=solution.convergence,
         outcome=solution.outcome,
         scale_mm_per_unit=_scale_mm_per_unit(solution, spec),
-        rigidity=_rigidity(best.mesh),
+        rigidity=rigidity_of(best.mesh),
     )
 
 
-def _rigidity(mesh: TriMesh) -> Rigidity | None:
-    """None where the mesh is degenerate: its other figures stand without."""
+def rigidity_of(mesh: TriMesh) -> Rigidity | None:
+    """How stiff the shell is; None where the mesh is degenerate: its other figures stand without."""
     try:
         return rigidity(mesh)
     except np.linalg.LinAlgError:

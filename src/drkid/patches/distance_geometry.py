@@ -11,7 +11,7 @@ from itertools import combinations
 import numpy as np
 from scipy.sparse import csr_array
 
-from drkid.mesh import Floats, Ints, TriMesh
+from drkid.mesh import Floats, Ints, TriMesh, summed
 from drkid.patches.outline import Outlined
 
 HOLD = 0.02  # weight of staying in place against equal distances; more of it leaves them unequal
@@ -38,8 +38,8 @@ class Place:
 
 def place(mesh: TriMesh) -> Place:
     """The mesh's own place: normals are the mean ones of the faces round each vertex, by area."""
-    normals = np.zeros((len(mesh.vertices), 3))
-    np.add.at(normals, mesh.faces.ravel(), np.repeat(mesh.face_normals * mesh.areas[:, None], 3, axis=0))
+    weighted = np.repeat(mesh.face_normals * mesh.areas[:, None], 3, axis=0)
+    normals = summed(mesh.faces.ravel(), weighted, len(mesh.vertices))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     return Place(mesh.vertices, np.einsum("vi,vj->vij", normals, normals) + ALONG**2 * np.eye(3))
 

@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.sparse.linalg import cg
 
 from drkid.measure import bend_radians
-from drkid.mesh import Floats, TriMesh
+from drkid.mesh import Floats, TriMesh, summed
 from drkid.remesh.closest_point import ClosestPoint
 
 SMOOTHING_EDGES = 0.5  # edges over which curvature is averaged: what is smaller than an edge no edge can follow
@@ -80,10 +80,9 @@ def curvature(surface: TriMesh, radius: float) -> Floats:
     ends = surface.vertices[surface.edges]
     along = (ends[:, 1] - ends[:, 0]) / surface.edge_lengths[:, None]
     bent = bend_radians(surface) * surface.edge_lengths / 2
-    tensor = np.zeros((len(surface.vertices), 6))
     rows, columns = np.triu_indices(3)
-    for end in range(2):
-        np.add.at(tensor, surface.edges[:, end], bent[:, None] * along[:, rows] * along[:, columns])
+    of_edge = bent[:, None] * along[:, rows] * along[:, columns]
+    tensor = summed(surface.edges.T.ravel(), np.tile(of_edge, (2, 1)), len(surface.vertices))
     mass = np.bincount(surface.faces.ravel(), np.repeat(surface.areas / 3, 3), minlength=len(surface.vertices))
     per_area = 2 / radius**2
     system = csr_array(diags_array(mass * per_area) - igl.cotmatrix(surface.vertices, surface.faces))
