@@ -246,7 +246,7 @@ def closest_slots(tree: TriangleTree, points: Floats, slots: Ints) -> tuple[Floa
 def _along(tree: TriangleTree, points: Floats, order: Ints, slots: Ints, weights: Floats) -> None:
     # For the points of `order`: the slots and the weights in them. Each looks first where the one before it was.
     stack = np.empty(DEEPEST, np.int64)
-    slot = 0
+    slot = np.int64(0)
     for i in order:
         _, slot = _nearest(tree.low, tree.high, tree.corners, points[i], slot, stack)
         second, third = _weights(tree.corners[slot], points[i])
@@ -259,7 +259,7 @@ def projected(tree: TriangleTree, points: Floats, threads: int | None = None) ->
 
     The number of `threads`, by default one for each processor, changes the time it takes and nothing else.
     """
-    points, order = np.ascontiguousarray(points), morton_order(points)
+    points, order = np.array(points, float, order="C"), morton_order(points)
     slots, weights = np.zeros(len(points), np.int64), np.empty((len(points), 3))
     chunks = [order[start : start + CHUNK] for start in range(0, len(order), CHUNK)]
 
@@ -279,5 +279,5 @@ def projected(tree: TriangleTree, points: Floats, threads: int | None = None) ->
 def closest_points(tree: TriangleTree, points: Floats) -> tuple[Floats, Ints, Floats]:
     """Squared distances (n,) of points (n, 3), the nearest triangles (n,) and the closest points (n, 3)."""
     slots = np.zeros(len(points), np.int64)
-    squared, weights = closest_slots(tree, np.ascontiguousarray(points), slots)
+    squared, weights = closest_slots(tree, np.array(points, float, order="C"), slots)
     return squared, tree.face[slots], np.einsum("ij,ijk->ik", weights, tree.corners[slots])

@@ -89,7 +89,7 @@ def _orient3d(a: Floats, b: Floats, c: Floats, d: Floats) -> int:
     if abs(value) > ORIENT_BOUND * permanent:
         return 1 if value > 0 else -1
     partials = np.empty(97)
-    used = _add_determinant(partials, 0, a, b, c, 1.0)
+    used = _add_determinant(partials, np.int64(0), a, b, c, 1.0)
     used = _add_determinant(partials, used, a, b, d, -1.0)
     used = _add_determinant(partials, used, a, c, d, 1.0)
     used = _add_determinant(partials, used, b, c, d, -1.0)
@@ -99,7 +99,7 @@ def _orient3d(a: Floats, b: Floats, c: Floats, d: Floats) -> int:
 @njit(cache=True)
 def _orient2d(a: Floats, b: Floats, c: Floats, x: int, y: int) -> int:
     # Sign of the area of a, b, c in the coordinates x and y.
-    partials, used = np.empty(13), 0
+    partials, used = np.empty(13), np.int64(0)
     for p, q, sign in ((a, b, 1.0), (b, c, 1.0), (c, a, 1.0)):
         used = _add_triple(partials, used, sign * p[x], q[y], 1.0)
         used = _add_triple(partials, used, -sign * p[y], q[x], 1.0)
@@ -156,11 +156,11 @@ def _folded(v: Floats, w: Floats, a: Floats, b: Floats) -> bool:
     # Do the triangles vwa and wvb lie on top of one another: in one plane, a and b on the same side of vw?
     if _orient3d(v, w, a, b) != 0:
         return False
-    return (
-        _orient2d(v, w, a, 0, 1) * _orient2d(v, w, b, 0, 1) > 0
-        or _orient2d(v, w, a, 1, 2) * _orient2d(v, w, b, 1, 2) > 0
-        or _orient2d(v, w, a, 2, 0) * _orient2d(v, w, b, 2, 0) > 0
-    )
+    for x in range(3):
+        y = (x + 1) % 3
+        if _orient2d(v, w, a, x, y) * _orient2d(v, w, b, x, y) > 0:
+            return True
+    return False
 
 
 @njit(cache=True)

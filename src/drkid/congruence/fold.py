@@ -161,12 +161,12 @@ def _prices(  # noqa: PLR0913, PLR0917 — a kernel over plain arrays
         pair = edges[n]
         for i in range(2):
             change[i] = -lengths[labels[pair[i]]]
-        _turn(labels, pair, turns[n], 1, len(lengths))
+        _turn(labels, pair, turns[n], np.int64(1), len(lengths))
         for i in range(2):
             change[i] += lengths[labels[pair[i]]]
         if _fits(faces, edge_faces, labels, allowed, pair):
             prices[n] = _price(fast, modes, pair, change, weight) - before
-        _turn(labels, pair, turns[n], -1, len(lengths))
+        _turn(labels, pair, turns[n], np.int64(-1), len(lengths))
     return prices
 
 
@@ -254,7 +254,7 @@ class Repair:
     def relabelled(self, frame: Framework, move: int, answer: Floats) -> Framework:
         """The framework with one relabelling done, its vertices where the fast modes take them."""
         labels = frame.labels.copy()
-        _turn(labels, self.moves.edges[move], self.moves.turns[move], 1, self.palette.size)
+        _turn(labels, np.array(self.moves.edges[move]), np.array(self.moves.turns[move]), 1, self.palette.size)
         edges = self.moves.edges[move][self.moves.edges[move] >= 0]
         shift = answer[:, edges] @ (frame.lengths[labels[edges]] - frame.wanted[edges])
         moved = frame.moved(frame.mesh.vertices + shift.reshape(-1, 3), frame.lengths)

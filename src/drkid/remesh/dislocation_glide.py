@@ -31,6 +31,20 @@ def _is_candidate(origin: Ints, twin: Ints, start: Ints, h: int) -> bool:
 
 
 @njit(cache=True)
+def _save(vertices: Floats, region: Ints, saved: Floats) -> None:
+    for k in range(len(region)):
+        for d in range(3):
+            saved[k, d] = vertices[region[k], d]
+
+
+@njit(cache=True)
+def _restore(vertices: Floats, region: Ints, saved: Floats) -> None:
+    for k in range(len(region)):
+        for d in range(3):
+            vertices[region[k], d] = saved[k, d]
+
+
+@njit(cache=True)
 def _glide(
     edges: tuple[Ints, Ints, Ints], vertices: Floats, normals: Floats, goal: Floats, order: Ints, heat: Floats
 ) -> int:
@@ -51,8 +65,7 @@ def _glide(
         )
         region = room[: gather(edges, 4, marks, mark, room)]
         before = energy(edges, vertices, goal, marks, mark, region)
-        for k in range(len(region)):
-            saved[k] = vertices[region[k]]
+        _save(vertices, region, saved)
         flip_edge(origin, twin, start, h)
         relax_region(origin, twin, start, vertices, normals, goal, region)
         if energy(edges, vertices, goal, marks, mark, region) < before + heat[i]:
@@ -60,8 +73,7 @@ def _glide(
         else:
             for _ in range(3):  # four flips of an edge are none
                 flip_edge(origin, twin, start, h)
-            for k in range(len(region)):
-                vertices[region[k]] = saved[k]
+            _restore(vertices, region, saved)
     return kept
 
 

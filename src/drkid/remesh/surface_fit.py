@@ -61,7 +61,8 @@ class System(NamedTuple):
 def _product(system: System, x: Floats, y: Floats) -> None:
     # y = A x
     faces, matrix, edges, along, stiffness, damping = system
-    y[:] = damping * x
+    for v, d in np.ndindex(x.shape):
+        y[v, d] = damping * x[v, d]
     for f in range(len(faces)):
         for row in range(9):
             total = 0.0

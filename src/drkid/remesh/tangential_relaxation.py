@@ -38,18 +38,19 @@ def _look_around(origin: Ints, twin: Ints, vertices: Floats, h: int, normals: Fl
 
 @njit(cache=True)
 def _move_where_harmless(origin: Ints, twin: Ints, start: Ints, vertices: Floats, targets: Floats) -> None:
-    before, after = np.empty((MOST_VALENCE, 3)), np.empty((MOST_VALENCE, 3))
+    before, after, was = np.empty((MOST_VALENCE, 3)), np.empty((MOST_VALENCE, 3)), np.empty(3)
     for v in range(len(start)):
-        was = vertices[v].copy()
         count, shape_before, fold_before = _look_around(origin, twin, vertices, start[v], before)
-        vertices[v] = targets[v]
+        for d in range(3):
+            was[d], vertices[v, d] = vertices[v, d], targets[v, d]
         _, shape_after, fold_after = _look_around(origin, twin, vertices, start[v], after)
         harmless = shape_after >= min(LEAST_SHAPE, shape_before) and fold_after >= min(FOLD_COSINE, fold_before)
         for i in range(count):
             turned = before[i, 0] * after[i, 0] + before[i, 1] * after[i, 1] + before[i, 2] * after[i, 2]
             harmless = harmless and turned > 0
         if not harmless or count == MOST_VALENCE:
-            vertices[v] = was
+            for d in range(3):
+                vertices[v, d] = was[d]
 
 
 def moved_where_harmless(mesh: TriMesh, targets: Floats) -> TriMesh:
