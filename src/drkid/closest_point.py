@@ -246,7 +246,7 @@ def closest_slots(tree: TriangleTree, points: Floats, slots: Ints) -> tuple[Floa
 def _along(tree: TriangleTree, points: Floats, order: Ints, slots: Ints, weights: Floats) -> None:
     # For the points of `order`: the slots and the weights in them. Each looks first where the one before it was.
     stack = np.empty(DEEPEST, np.int64)
-    slot = np.int64(0)
+    slot = int(np.int64(0))
     for i in order:
         _, slot = _nearest(tree.low, tree.high, tree.corners, points[i], slot, stack)
         second, third = _weights(tree.corners[slot], points[i])

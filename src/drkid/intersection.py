@@ -89,7 +89,7 @@ def _orient3d(a: Floats, b: Floats, c: Floats, d: Floats) -> int:
     if abs(value) > ORIENT_BOUND * permanent:
         return 1 if value > 0 else -1
     partials = np.empty(97)
-    used = _add_determinant(partials, np.int64(0), a, b, c, 1.0)
+    used = _add_determinant(partials, int(np.int64(0)), a, b, c, 1.0)
     used = _add_determinant(partials, used, a, b, d, -1.0)
     used = _add_determinant(partials, used, a, c, d, 1.0)
     used = _add_determinant(partials, used, b, c, d, -1.0)
@@ -99,7 +99,7 @@ def _orient3d(a: Floats, b: Floats, c: Floats, d: Floats) -> int:
 @njit(cache=True)
 def _orient2d(a: Floats, b: Floats, c: Floats, x: int, y: int) -> int:
     # Sign of the area of a, b, c in the coordinates x and y.
-    partials, used = np.empty(13), np.int64(0)
+    partials, used = np.empty(13), int(np.int64(0))
     for p, q, sign in ((a, b, 1.0), (b, c, 1.0), (c, a, 1.0)):
         used = _add_triple(partials, used, sign * p[x], q[y], 1.0)
         used = _add_triple(partials, used, -sign * p[y], q[x], 1.0)

@@ -161,12 +161,12 @@ def _prices(  # noqa: PLR0913, PLR0917 — a kernel over plain arrays
         pair = edges[n]
         for i in range(2):
             change[i] = -lengths[labels[pair[i]]]
-        _turn(labels, pair, turns[n], np.int64(1), len(lengths))
+        _turn(labels, pair, turns[n], int(np.int64(1)), len(lengths))
         for i in range(2):
             change[i] += lengths[labels[pair[i]]]
         if _fits(faces, edge_faces, labels, allowed, pair):
             prices[n] = _price(fast, modes, pair, change, weight) - before
-        _turn(labels, pair, turns[n], np.int64(-1), len(lengths))
+        _turn(labels, pair, turns[n], int(np.int64(-1)), len(lengths))
     return prices
 
 

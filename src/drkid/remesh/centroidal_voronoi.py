@@ -112,7 +112,7 @@ def _clip(
 ) -> tuple[int, int]:
     # Clip the triangle in polygons[0] to the cell of seed i; the number of its corners and which of the two buffers
     # it is in, or -1 where the neighbours given are too few to be sure.
-    count, here = np.int64(3), np.int64(0)
+    count, here = int(np.int64(3)), int(np.int64(0))
     reach = _reach(polygons, here, count, sites, i)
     for k in range(near.shape[1]):
         if apart[i, k] > 4 * reach:
@@ -205,7 +205,7 @@ def _restricted_voronoi(
     # order of distance, `apart` their squared distances. Mass, energy and moment (N, 5) of each cell; the dual
     # triangles; and False where K seeds were too few to be sure of a cell.
     n = len(sites)
-    cells, triangles, found = np.zeros((n, 5)), np.empty((16 * n + 16, 3), np.int64), np.int64(0)
+    cells, triangles, found = np.zeros((n, 5)), np.empty((16 * n + 16, 3), np.int64), int(np.int64(0))
     queued, queue = np.full(n, -1, np.int64), np.empty(n, np.int64)
     polygons, sides, left = np.empty((2, CORNERS, 3)), np.empty((2, CORNERS), np.int64), np.empty(CORNERS)
     for f in range(len(corners)):
