@@ -207,7 +207,7 @@ def test_a_print_smaller_than_its_pieces_is_refused(potato):
 
 
 def test_flags_take_the_place_of_what_a_file_says(pair_folder, potato_file, tmp_path, capsys):
-    file = ["--spec", str(pair_folder / "kit.json"), "--rounds", "1", "--connector", "none", "--json"]
+    file = ["--spec", str(pair_folder / "kit.json"), "--rounds", "1", "--connector", "none", "--no-documents", "--json"]
     expected = {
         "--palette=40,46": ([40.0, 46.0], 40, "palette"),
         "--like=" + str(pair_folder): (list(UNIVERSAL), 40, "palette"),

@@ -198,9 +198,10 @@ class PaletteSolver:
         if state.found.exact:
             return Outcome("converged", f"exact: largest error {percent:.1g} % {after}")
         status = "converged" if percent <= self.spec.tolerance_for(len(state.best.mesh.faces)) else "stalled"
-        return Outcome(
-            status, f"not exact: largest error {percent:.3g} % {after}; more --seconds or --classes may help"
-        )
+        remedy = "more --seconds or --classes may help"
+        if genus := state.best.mesh.genus:
+            remedy += f", though a surface of genus {genus} has {6 * genus} lengths more than freedoms"
+        return Outcome(status, f"not exact: largest error {percent:.3g} % {after}; {remedy}")
 
     def told(self, state: PaletteState) -> str:
         """Exact or not, T, d_H and the 95th percentile of the dihedrals."""
