@@ -7,9 +7,12 @@ import pytest
 
 from drkid import verification
 from drkid.errors import KitFolderError
+from drkid.export.kit_document import part_name
+from drkid.export.layout import part_label
 from drkid.export.ply import ply_bytes
-from drkid.export.stl import stl_bytes
+from drkid.export.stl import rounded, stl_bytes
 from drkid.mesh import TriMesh
+from drkid.parts.pocket import pocket
 from drkid.verification import verify_kit
 
 
@@ -169,6 +172,23 @@ def test_a_part_whose_solid_lies_off_its_frame_is_found(copy, kit):
     file = next((copy / "parts").glob("A*.stl"))
     file.write_bytes(stl_bytes(mesh.moved(mesh.vertices + np.array([1.0, 0.0, 0.0]))))
     assert "swing of the joints" in failures(copy)
+
+
+def test_one_pocket_that_is_wider_than_the_others_is_found(copy, kit):
+    """By a fiftieth of a millimetre: half a per cent of its volume."""
+    part = kit.part_set.parts[0]
+    frame = part.side_frames[1].copy()
+    frame[:3, 3] += 0.02 * frame[:3, 0]
+    solid = part.solid - pocket(kit.part_set.dimensions).moved(frame)
+    (copy / part_name(part)).write_bytes(stl_bytes(rounded(solid.mesh())))
+    found = {check.name: check for check in verify_kit(copy).checks if not check.passed}
+    assert set(found) == {"pockets are alike"}
+    assert f"{part_label(part_name(part))} side 2" in found["pockets are alike"].detail
+
+
+def test_pockets_that_are_too_tight_for_the_stated_clearance_are_found(copy):
+    edit(copy, lambda document: document["spec"].update(clearance_mm=0.3))
+    assert "clearance of the pockets" in failures(copy)
 
 
 def test_a_kit_that_states_no_assembly_has_to_close(copy):

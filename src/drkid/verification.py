@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from drkid.assembly.structure import Structure
 from drkid.congruence.softest_mode import rigidity
 from drkid.export import KitDocument
-from drkid.export.layout import ASSEMBLED, BOM_CSV, BOM_JSON, PIECE_CLASS, SIMPLIFIED, SURFACE
+from drkid.export.layout import ASSEMBLED, BOM_CSV, BOM_JSON, PIECE_CLASS, SIMPLIFIED, SURFACE, part_label
 from drkid.export.read_back import broken_file, read_document, read_mesh
 from drkid.intersection import self_intersections
 from drkid.kit import Building, Closure, Overlapping, Swing
@@ -17,7 +18,9 @@ from drkid.measure import bend_radians, dihedral
 from drkid.mesh import Floats, Ints, TriMesh
 from drkid.metrics import surface_distances
 from drkid.printed import structure_of
+from drkid.printed_pockets import PocketRoom, pocket_figures
 from drkid.solid import Solid
+from drkid.spec import KitSpec
 
 RELATIVE = 1e-6  # of a recomputed length: PLY and JSON keep full double precision
 DISTANCE_PERCENT = 0.02  # of the diagonal: what two samplings of a surface may differ by
@@ -26,6 +29,8 @@ PLACEMENT_MM = 0.02
 PRINTED_MM = 1e-4  # between corners and stated lengths: single precision in the STL files is no better
 ASSEMBLED_MM, ASSEMBLED_SHARE = 1e-3, 0.01  # what a relaxation that is begun from rounded figures may differ by
 SWING_DEGREES = 0.1  # a corner in single precision, seen from an axis a fraction of a mm away
+POCKET_SHARE = 1e-4  # of a pocket's volume: by how much two may differ, in volume or shape
+CLEARANCE_MM = 1e-3  # what the facets of round connectors may take from a clearance
 SINGULAR_VALUE = 1e-6  # of the rigidity matrix: below it is rounding, a square root of it
 
 
@@ -284,11 +289,40 @@ def _together(folder: Path, mesh: TriMesh, kit: KitDocument) -> list[Check]:
         return [_closes(closure, kit), Check("building", passed=False, detail="the order is not one of all pieces")]
     last = structure.insertion(float(kit.spec["thickness_mm"]), order[-1:])
     return [
+        *_pockets(structure, kit),
         _closes(closure, kit),
         *_closure(closure, kit),
         _swings(swing, kit),
         _overlaps(structure.overlapping(float(kit.spec["swing_degrees"])), kit),
         _builds(structure.building(order, last), kit),
+    ]
+
+
+def _pockets(structure: Structure, kit: KitDocument) -> list[Check]:
+    """All pockets are one, with the stated clearance; nothing to ask of a kit without, or of curved pieces.
+
+    Around a curved piece's pocket neither its faces nor its bevels are plane, so that they cannot be told from it.
+    """
+    if not structure.connectors or kit.metrics.curved is not None:
+        return []
+    preset = KitSpec.parse({name: kit.spec.get(name) for name in ("process", "process_values")}).preset
+    clearance, wall, thickness = (float(kit.spec[f"{name}_mm"]) for name in ("clearance", "min_wall", "thickness"))
+    names = [part_label(part.file) for one in kit.classes for part in one.parts]
+    room = PocketRoom(clearance, wall, thickness, preset.draft_degrees, kit.metrics.merged is not None)
+    try:
+        found = pocket_figures(structure.shapes, names, structure.connectors, room)
+    except ValueError as error:
+        return [Check("pockets are alike", passed=False, detail=str(error))]
+    crowded = f", but {found.crowded} with another within their walls" if found.crowded else ""
+    told = (
+        f"{found.pockets}{crowded} of {found.volume_mm3:.4g} mm³: volumes within {found.volume_share:.1g}, shapes "
+        f"within {found.shape_share:.1g} of that (limit {POCKET_SHARE:g}); farthest apart {' and '.join(found.between)}"
+    )
+    alike = max(found.volume_share, found.shape_share) <= POCKET_SHARE
+    least = f"connectors {found.clearance_mm:.4g} mm clear of their pockets, stated {clearance:g}"
+    return [
+        Check("pockets are alike", alike, told),
+        Check("clearance of the pockets", abs(found.clearance_mm - clearance) <= CLEARANCE_MM, least),
     ]
 
 
