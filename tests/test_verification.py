@@ -1,5 +1,6 @@
 import json
 import shutil
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,12 @@ from drkid.errors import KitFolderError
 from drkid.export.kit_document import part_name
 from drkid.export.layout import part_label
 from drkid.export.ply import ply_bytes
-from drkid.export.stl import rounded, stl_bytes
-from drkid.mesh import TriMesh
+from drkid.export.stl import stl_bytes
+from drkid.export.three_mf import PlateObject, three_mf_bytes
+from drkid.kit import BRIDGE, Finding
+from drkid.mesh import TriMesh, rounded
 from drkid.parts.pocket import pocket
+from drkid.solid import Solid
 from drkid.verification import verify_kit
 
 
@@ -189,6 +193,34 @@ def test_one_pocket_that_is_wider_than_the_others_is_found(copy, kit):
 def test_pockets_that_are_too_tight_for_the_stated_clearance_are_found(copy):
     edit(copy, lambda document: document["spec"].update(clearance_mm=0.3))
     assert "clearance of the pockets" in failures(copy)
+
+
+def plate_of(slab: Solid, name: str, lift_mm: float = 0.0) -> bytes:
+    matrix = np.eye(4)
+    matrix[:3, 3] = 50, 50, lift_mm
+    return three_mf_bytes("plate", [PlateObject(name, "#000000", slab.mesh(), [matrix])])
+
+
+def test_what_bridges_too_far_on_a_plate_is_found_unless_it_is_told(copy):
+    (copy / "plates").mkdir()
+    file = copy / "plates" / "plate_01.3mf"
+    slab = Solid.box([0, 0, 0], [30, 30, 6])
+    file.write_bytes(plate_of(slab - Solid.box([8, 8, -1], [17, 22, 4]), "A_left"))
+    assert not failures(copy)
+    file.write_bytes(plate_of(slab - Solid.box([8, 8, -1], [20, 22, 4]), "A_left"))
+    assert failures(copy) == {"bridges on the plates"}
+    wide = Finding("class A (left)", BRIDGE, 10.0, 12.0, "mm", "at most")
+    edit(copy, lambda document: document["findings"].append(asdict(wide)))
+    assert not failures(copy)
+    file.write_bytes(plate_of(slab, "A_left", lift_mm=0.5))
+    assert failures(copy) == {"plates"}
+
+
+def test_a_broken_plate_is_named(copy):
+    (copy / "plates").mkdir()
+    (copy / "plates" / "plate_01.3mf").write_bytes(b"{nonsense")
+    with pytest.raises(KitFolderError, match="plate_01"):
+        verify_kit(copy)
 
 
 def test_a_kit_that_states_no_assembly_has_to_close(copy):

@@ -10,15 +10,18 @@ import numpy as np
 from drkid.assembly.structure import Structure
 from drkid.congruence.softest_mode import rigidity
 from drkid.export import KitDocument
+from drkid.export.document import FindingDocument
 from drkid.export.layout import ASSEMBLED, BOM_CSV, BOM_JSON, PIECE_CLASS, SIMPLIFIED, SURFACE, part_label
 from drkid.export.read_back import broken_file, read_document, read_mesh
 from drkid.intersection import self_intersections
-from drkid.kit import Building, Closure, Overlapping, Swing
+from drkid.kit import BRIDGE, Building, Closure, Overlapping, Swing
 from drkid.measure import bend_radians, dihedral
 from drkid.mesh import Floats, Ints, TriMesh
 from drkid.metrics import surface_distances
 from drkid.printed import structure_of
+from drkid.printed_plates import lying
 from drkid.printed_pockets import PocketRoom, pocket_figures
+from drkid.process import ProcessPreset
 from drkid.solid import Solid
 from drkid.spec import KitSpec
 
@@ -85,6 +88,7 @@ def verify_kit(folder: str | Path) -> Verification:
         _parts(folder, kit),
         *_together(folder, assembled, kit),
         _parts_list(folder, kit),
+        *_plates(folder, kit),
     )
     return Verification(folder, checks)
 
@@ -305,10 +309,9 @@ def _pockets(structure: Structure, kit: KitDocument) -> list[Check]:
     """
     if not structure.connectors or kit.metrics.curved is not None:
         return []
-    preset = KitSpec.parse({name: kit.spec.get(name) for name in ("process", "process_values")}).preset
     clearance, wall, thickness = (float(kit.spec[f"{name}_mm"]) for name in ("clearance", "min_wall", "thickness"))
     names = [part_label(part.file) for one in kit.classes for part in one.parts]
-    room = PocketRoom(clearance, wall, thickness, preset.draft_degrees, kit.metrics.merged is not None)
+    room = PocketRoom(clearance, wall, thickness, _preset(kit).draft_degrees, kit.metrics.merged is not None)
     try:
         found = pocket_figures(structure.shapes, names, structure.connectors, room)
     except ValueError as error:
@@ -390,6 +393,33 @@ def _builds(building: Building, kit: KitDocument) -> Check:
         return Check("building", building.last_goes_in, told)
     same = stated.building.last_goes_in == building.last_goes_in and stated.building.enclosed == building.enclosed
     return Check("building", same and _near(stated.building.border_mean_mm, building.border_mean_mm), told)
+
+
+def _plates(folder: Path, kit: KitDocument) -> list[Check]:
+    """Everything lies on its bed, and bridges no more than the process can, unless a finding says so."""
+    found = lying(folder)
+    if not found:
+        return []
+    worst, preset = max(found, key=lambda one: one.bridge_mm), _preset(kit)
+    told = {f.subject.removeprefix("class ").replace("(", "").replace(")", "") for f in kit.findings if _is_too_wide(f)}
+    limit = np.inf if preset.longest_bridge_mm is None else preset.longest_bridge_mm + CLEARANCE_MM
+    untold = [one for one in found if one.bridge_mm > limit and one.name.replace("_", " ") not in told]
+    bad = "; ".join(f"{one.name}: {one.bridge_mm:.2f} mm is not told" for one in untold)
+    needed = "any prints" if preset.longest_bridge_mm is None else f"at most {preset.longest_bridge_mm:g}"
+    widest = f"widest {worst.bridge_mm:.2f} mm, of {worst.name}; {needed}"
+    off, items = max(one.above_bed_mm for one in found), sum(one.copies for one in found)
+    return [
+        Check("bridges on the plates", not untold, bad or widest),
+        Check("plates", off <= CLEARANCE_MM, f"{items} items, within {off:.1g} mm of the bed"),
+    ]
+
+
+def _is_too_wide(finding: FindingDocument) -> bool:
+    return finding.what == BRIDGE and finding.available > finding.needed
+
+
+def _preset(kit: KitDocument) -> ProcessPreset:
+    return KitSpec.parse({name: kit.spec.get(name) for name in ("process", "process_values")}).preset
 
 
 def _near(stated_mm: float, found_mm: float) -> bool:

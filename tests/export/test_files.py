@@ -12,9 +12,9 @@ from drkid.export.bill_of_materials import bom_csv, bom_json, connector_row, pie
 from drkid.export.colour import COLOURS, class_colour
 from drkid.export.layout import connector_file, part_file, part_label, picture_file, plate_file
 from drkid.export.ply import ply_bytes
-from drkid.export.stl import rounded, stl_bytes
+from drkid.export.stl import stl_bytes
 from drkid.kit import class_id
-from drkid.mesh import TriMesh
+from drkid.mesh import TriMesh, rounded
 from drkid.solid import Solid
 from drkid.spec import KitSpec
 

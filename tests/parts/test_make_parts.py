@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drkid.errors import FitError
-from drkid.export.stl import rounded, stl_bytes
+from drkid.export.stl import stl_bytes
 from drkid.kit import Decomposition, PartSet
 from drkid.measure import bend_radians
-from drkid.mesh import TriMesh
+from drkid.mesh import TriMesh, rounded
 from drkid.parts import make_parts
 from drkid.parts.pocket import pocket
 from drkid.spec import PROCESSES, KitSpec

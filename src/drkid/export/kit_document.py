@@ -12,9 +12,8 @@ from drkid.curved_patch import barycentric_grid
 from drkid.export import document as doc
 from drkid.export.bill_of_materials import Moulding, Row, connector_row, moulding, piece_row, rod_row
 from drkid.export.layout import connector_file, part_file
-from drkid.export.stl import rounded
 from drkid.kit import Distance, Kit, Metrics, Part, class_id
-from drkid.mesh import Floats, TriMesh
+from drkid.mesh import Floats, TriMesh, rounded
 
 MOST_RECORDS = 500  # of the convergence history; a plot shows no more
 

@@ -28,7 +28,7 @@ from drkid.parts.members import Members
 from drkid.parts.notes import connector_notes, corner_notes, groove_notes, notes
 from drkid.parts.pocket import pocket, side_frames
 from drkid.parts.prismoid import Prismoid
-from drkid.parts.process_findings import findings
+from drkid.parts.process_findings import bridge_findings, findings
 from drkid.parts.snap import snap_half
 from drkid.parts.thickening import thickened
 from drkid.parts.truncation import Truncated, truncated
@@ -103,6 +103,8 @@ def make_parts(
     if merged is not None:
         part_set = merged_parts(merged, part_set, spec, tuple(connector_notes(members, design.dimensions)))
     part_set = _marked(part_set, spec)
+    bridges = bridge_findings(part_set.parts, part_set.connectors, spec)
+    part_set = replace(part_set, findings=(*part_set.findings, *bridges))
     for part in part_set.parts:
         _require_bed(part, spec)
     progress("cutting parts", 1.0)
