@@ -41,13 +41,12 @@ def bridge_findings(parts: Sequence[Part], connectors: Sequence[Connector], spec
     longest = spec.preset.longest_bridge_mm
     if longest is None:
         return
-    found: dict[tuple[int, int], float] = {}  # what is as wide in a part's mirror image
+    found: dict[int, float] = {}  # what is as wide in a part's mirror image
     for part in parts:
-        key = part.class_index, part.variant
-        if key not in found:
-            found[key] = _bridge_mm(part.solid, longest)
+        if part.class_index not in found:
+            found[part.class_index] = _bridge_mm(part.solid, longest)
         hand = "" if part.handedness == "any" else f" ({part.handedness})"
-        yield _bridge(f"class {part.name}{hand}", longest, found[key])
+        yield _bridge(f"class {part.name}{hand}", longest, found[part.class_index])
     for one in connectors:
         yield _bridge(one.name.replace("_", " "), longest, _bridge_mm(one.solid, longest))
 
