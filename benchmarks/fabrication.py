@@ -2,7 +2,8 @@
 
 Each of the good shapes with 172 pieces × palette solver with two and with four classes, pressure solver with seven ×
 fdm, sla and injection, at the smallest size that fits. Each kit is written, read back and checked by `drkid check`'s
-own verification, and by another program where one is given. Prints one table and writes results/fabrication.json.
+own verification, and by another program where one is given. Prints one table and writes results/fabrication.json,
+where rows of other kits stay as they are.
 
     python benchmarks/fabrication.py                               all 81 kits
     python benchmarks/fabrication.py --shapes golgi_vesicle.mrc --processes sla
@@ -73,6 +74,17 @@ def in_a_folder(kit: tuple[str, str, str], checker: str | None) -> dict:
         return measured(*kit, checker, Path(folder) / "kit")
 
 
+def key(row: dict) -> tuple[str, str, str]:
+    """Which kit a row is of."""
+    return row["shape"], row["solver"], row["process"]
+
+
+def ordered(stored: dict[tuple[str, str, str], dict]) -> list[tuple[str, str, str]]:
+    """The kits in the order in which all of them run; others, of shapes that are no longer there, last."""
+    places = {kit: place for place, kit in enumerate(product(SHAPES, SOLVERS, PROCESSES))}
+    return sorted(stored, key=lambda kit: places.get(kit, len(places)))
+
+
 def line(row: dict) -> str:
     """One printed row."""
     head = f"{row['shape'].split('.')[0][:22]:<23}{row['solver']:<11}{row['process']:<10}"
@@ -102,12 +114,14 @@ def main() -> None:
         "parts asm docs"
     )
     rows = []
+    stored = {key(row): row for row in json.loads(options.out.read_text())} if options.out.exists() else {}
     kits = list(product(options.shapes, options.solvers, options.processes))
     with ProcessPoolExecutor(options.jobs) as pool:
         for row in pool.map(in_a_folder, kits, repeat(options.checker)):
             rows.append(row)
             print(line(row), flush=True)
-            options.out.write_text(json.dumps(rows, indent=1) + "\n")
+            stored[key(row)] = row
+            options.out.write_text(json.dumps([stored[one] for one in ordered(stored)], indent=1) + "\n")
     passed = sum(not (r.get("refused") or r["failed"] or r.get("checker")) for r in rows)
     print(f"{passed} of {len(rows)} kits pass everything")
 

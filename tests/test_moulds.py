@@ -124,6 +124,15 @@ def test_a_kit_like_another_has_its_lengths_triangles_and_pieces(pair_folder):
         assert (spec.faces, spec.thickness_mm, spec.rod_diameter_mm) == (60, 6.9, 1.75)
 
 
+def test_a_kit_like_one_with_bevel_variants_has_one_bevel(pair_folder, tmp_path):
+    document = json.loads((pair_folder / "kit.json").read_text())
+    document["spec"] |= {"bevel_variants": 2, "bevel_degrees": None}
+    document["classes"] = [one | {"id": one["id"] + n} for one in document["classes"] for n in "12"]
+    (tmp_path / "kit.json").write_text(json.dumps(document))
+    spec = with_moulds_of(KitSpec(like=tmp_path))
+    assert (spec.multisets, spec.classes, spec.bevel_variants) == ("ssl,sll", 2, 1)
+
+
 def test_what_is_given_goes_before_the_other_kit(pair_folder):
     spec = with_moulds_of(KitSpec(like=pair_folder, thickness_mm=8, classes=2))
     assert (spec.thickness_mm, spec.process) == (8, "fdm")

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drkid.mesh import TriMesh
-from drkid.solid import CIRCLE_SEGMENTS, Solid, circle_outside
+from drkid.solid import CIRCLE_SEGMENTS, Solid, circle_outside, widest_circle_mm
 
 CUBE = Solid.box((0, 0, 0), (1, 1, 1))
 
@@ -71,3 +71,10 @@ def test_cross_section_has_the_area_of_the_cut() -> None:
     assert (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2 == pytest.approx(1.0)
     assert square.min(axis=0) == pytest.approx([3, 0])
     assert list(CUBE.cross_section(2.0)) == []
+
+
+def test_widest_circle_of_a_union() -> None:
+    left = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 6.0], [0.0, 6.0]])
+    assert widest_circle_mm(left[None]) == pytest.approx(4, abs=0.02)
+    assert widest_circle_mm(np.stack([left, left + np.array([3.0, 0.0])])) == pytest.approx(6, abs=0.02)
+    assert widest_circle_mm(np.stack([left, left + np.array([5.0, 0.0])])) == pytest.approx(4, abs=0.02)

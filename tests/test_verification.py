@@ -1,5 +1,6 @@
 import json
 import shutil
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -7,9 +8,15 @@ import pytest
 
 from drkid import verification
 from drkid.errors import KitFolderError
+from drkid.export.kit_document import part_name
+from drkid.export.layout import part_label
 from drkid.export.ply import ply_bytes
 from drkid.export.stl import stl_bytes
-from drkid.mesh import TriMesh
+from drkid.export.three_mf import PlateObject, three_mf_bytes
+from drkid.kit import BRIDGE, Finding
+from drkid.mesh import TriMesh, rounded
+from drkid.parts.pocket import pocket
+from drkid.solid import Solid
 from drkid.verification import verify_kit
 
 
@@ -169,6 +176,51 @@ def test_a_part_whose_solid_lies_off_its_frame_is_found(copy, kit):
     file = next((copy / "parts").glob("A*.stl"))
     file.write_bytes(stl_bytes(mesh.moved(mesh.vertices + np.array([1.0, 0.0, 0.0]))))
     assert "swing of the joints" in failures(copy)
+
+
+def test_one_pocket_that_is_wider_than_the_others_is_found(copy, kit):
+    """By a fiftieth of a millimetre: half a per cent of its volume."""
+    part = kit.part_set.parts[0]
+    frame = part.side_frames[1].copy()
+    frame[:3, 3] += 0.02 * frame[:3, 0]
+    solid = part.solid - pocket(kit.part_set.dimensions).moved(frame)
+    (copy / part_name(part)).write_bytes(stl_bytes(rounded(solid.mesh())))
+    found = {check.name: check for check in verify_kit(copy).checks if not check.passed}
+    assert set(found) == {"pockets are alike"}
+    assert f"{part_label(part_name(part))} side 2" in found["pockets are alike"].detail
+
+
+def test_pockets_that_are_too_tight_for_the_stated_clearance_are_found(copy):
+    edit(copy, lambda document: document["spec"].update(clearance_mm=0.3))
+    assert "clearance of the pockets" in failures(copy)
+
+
+def plate_of(slab: Solid, name: str, lift_mm: float = 0.0) -> bytes:
+    matrix = np.eye(4)
+    matrix[:3, 3] = 50, 50, lift_mm
+    return three_mf_bytes("plate", [PlateObject(name, "#000000", slab.mesh(), [matrix])])
+
+
+def test_what_bridges_too_far_on_a_plate_is_found_unless_it_is_told(copy):
+    (copy / "plates").mkdir()
+    file = copy / "plates" / "plate_01.3mf"
+    slab = Solid.box([0, 0, 0], [30, 30, 6])
+    file.write_bytes(plate_of(slab - Solid.box([8, 8, -1], [17, 22, 4]), "A_left"))
+    assert not failures(copy)
+    file.write_bytes(plate_of(slab - Solid.box([8, 8, -1], [20, 22, 4]), "A_left"))
+    assert failures(copy) == {"bridges on the plates"}
+    wide = Finding("class A (left)", BRIDGE, 10.0, 12.0, "mm", "at most")
+    edit(copy, lambda document: document["findings"].append(asdict(wide)))
+    assert not failures(copy)
+    file.write_bytes(plate_of(slab, "A_left", lift_mm=0.5))
+    assert failures(copy) == {"plates"}
+
+
+def test_a_broken_plate_is_named(copy):
+    (copy / "plates").mkdir()
+    (copy / "plates" / "plate_01.3mf").write_bytes(b"{nonsense")
+    with pytest.raises(KitFolderError, match="plate_01"):
+        verify_kit(copy)
 
 
 def test_a_kit_that_states_no_assembly_has_to_close(copy):

@@ -1,7 +1,7 @@
 """Kit and its parts: the values that the stages fill, in the order in which data visits them."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -20,6 +20,7 @@ Status = Literal["converged", "stalled"]
 Firmness = Literal["stiff", "soft", "may snap through"]
 Verdict = Literal["closes", "closes with strain", "does not close"]
 
+BRIDGE = "widest bridge, as it lies on its plate"  # what a finding of it is about
 FINDING_TOLERANCE = 1e-6  # mm or degrees: what rounding may take from a dimension
 
 
@@ -267,7 +268,7 @@ class Part:
 
     `corners` (n, 3) counter-clockwise from outside, `side_frames` (n, 4, 4) from connector to part coordinates; three
     of a triangle, more of merged ones. `solid` is all of it, whatever its faces: flat, curved or bent.
-    `variant` counts the bevels of a class from 1; 0 where it has one.
+    `class_name` is A1, A2, … where bevel variants split the class A; its own letter where it is not given.
     """
 
     class_index: int
@@ -275,12 +276,12 @@ class Part:
     corners: Floats
     side_frames: Floats
     solid: Solid
-    variant: int = 0
+    class_name: str = ""
 
     @property
     def name(self) -> str:
         """As people read it: A, or A2 where class A has several bevels."""
-        return f"{class_id(self.class_index)}{self.variant or ''}"
+        return self.class_name or class_id(self.class_index)
 
 
 @dataclass(frozen=True)
@@ -340,6 +341,9 @@ class PartSet:
     `groove_choices` is what bevels made for this shape alone, and further variants of them, would make of it.
     `coupon` is a fit test as it lies on the bed, None where there is no connector. `cut_corners` of the shapes are cut
     off, by up to `deepest_cut_mm`, because pieces of one vertex would meet there.
+
+    Where bevel variants split classes, each is a class of its own: `split_class` (m,) are the decomposition's classes
+    that they come from, in their order; empty where no class is split.
     """
 
     scale_mm_per_unit: float
@@ -356,6 +360,18 @@ class PartSet:
     merged: tuple[MergedPiece, ...] = ()  # class_index is then the part's number; empty where each face is a piece
     cut_corners: int = 0
     deepest_cut_mm: float = 0.0
+    split_class: tuple[int, ...] = ()
+
+    def by_parts(self, decomposition: Decomposition) -> Decomposition:
+        """The decomposition with the classes of the parts: the same one where no class is split."""
+        if not self.split_class:
+            return decomposition
+        of_part = np.array([part.class_index for part in self.parts], np.int64)
+        return replace(
+            decomposition,
+            face_class=of_part[self.face_part],
+            class_lengths=decomposition.class_lengths[list(self.split_class)],
+        )
 
 
 @dataclass(frozen=True, eq=False)

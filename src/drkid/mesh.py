@@ -283,3 +283,11 @@ def _order(keys: Ints) -> Ints:
         return np.argsort(keys, kind="stable")
     places = np.arange(len(keys))
     return np.sort((keys << bits) | places) & ((1 << bits) - 1)
+
+
+def rounded(mesh: TriMesh) -> TriMesh:
+    """The mesh with coordinates as STL and 3MF store them, without the triangles that lose a corner by that."""
+    vertices, index = np.unique(mesh.vertices.astype(np.float32) + np.float32(0), axis=0, return_inverse=True)
+    faces = index.ravel()[mesh.faces]
+    whole = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    return TriMesh(vertices.astype(np.float64), faces[whole])

@@ -59,6 +59,7 @@ def _mould_values(document: KitDocument) -> dict[str, Any]:
         "mean_edge_mm",
         "fit",
         "bed_mm",
+        "bevel_variants",  # pieces of given lengths have one bevel
     }
     return {name: value for name, value in document.spec.items() if name in shaping and value is not None}
 

@@ -69,7 +69,7 @@ def make_kit(source: str | Path | None = None, spec: KitSpec | None = None, prog
     with stage("parts") as told:
         part_set = make_parts(unmerged, spec, told, patches)
     scale = part_set.scale_mm_per_unit
-    printed = _scaled(decomposition, scale)
+    printed = _scaled(part_set.by_parts(decomposition), scale)
     with stage("assembly") as told:
         assembly = assemble(printed.mesh, part_set, told, spec)
     with stage("measure"):

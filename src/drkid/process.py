@@ -44,6 +44,9 @@ class ProcessPreset(BaseModel):
     max_undercut_mm: Length | None = Field(
         default=None, description="deepest undercut that springs off a mould; no mould where not given"
     )
+    longest_bridge_mm: Extent | None = Field(
+        default=None, description="widest overhang that prints without support; any where not given"
+    )
 
 
 def _known(  # noqa: PLR0913, PLR0917 — a row of the table below
@@ -78,13 +81,12 @@ def _known(  # noqa: PLR0913, PLR0917 — a row of the table below
 
 
 _THIN_RODS = (1.0, 1.5, 2.0)
+_LAYERED = {"overhang_degrees": 45.0, "longest_bridge_mm": 10.0}
 _MOULD = {"max_wall_mm": 3.5, "draft_degrees": 1.0, "max_undercut_mm": 0.3}
 
 # The accuracy is half of what makers of machines state as theirs.
 PROCESSES: dict[str, ProcessPreset] = {
-    "fdm": _known(
-        0.20, 0.15, 1.2, (1.0, 3.0, 0.40), 2.0, (0.6, 0.4), (1.75, 2.0, 3.0), 1.24, 0.30, 0.1, overhang_degrees=45.0
-    ),
+    "fdm": _known(0.20, 0.15, 1.2, (1.0, 3.0, 0.40), 2.0, (0.6, 0.4), (1.75, 2.0, 3.0), 1.24, 0.30, 0.1, **_LAYERED),
     "sla": _known(0.15, 0.10, 1.0, (0.8, 2.0, 0.30), 0.5, (0.4, 0.4), _THIN_RODS, 1.18, 0.25, 0.05),
     "polyjet": _known(0.15, 0.10, 1.0, (0.8, 2.0, 0.30), 1.0, (0.5, 0.5), _THIN_RODS, 1.18, 0.25, 0.05),
     "injection": _known(0.08, 0.05, 1.2, (0.8, 2.0, 0.15), 0.0, (0.5, 0.3), _THIN_RODS, 1.04, 0.20, 0.025, **_MOULD),

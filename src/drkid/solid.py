@@ -12,6 +12,7 @@ from drkid.mesh import Floats, Ints, TriMesh
 
 CIRCLE_SEGMENTS = 48  # facets of a round shape: less than 0.01 mm off the circle at hinge radii
 
+CIRCLE_MM = 0.01
 SLIVER = 1e-3  # corners of outlines that stand out by less are dropped: they are rounding, and make needles of faces
 
 
@@ -131,6 +132,17 @@ class Solid:
     def cross_section(self, z: float) -> Sequence[Floats]:
         """The polygons, each (n, 2), in which the plane at height z cuts the solid."""
         return [np.asarray(p, np.float64) for p in self.body.slice(z).to_polygons()]
+
+
+def widest_circle_mm(polygons: Floats) -> float:
+    """Diameter of the largest circle in the union of counter-clockwise polygons (m, n, 2), within `CIRCLE_MM`."""
+    plan = manifold3d.CrossSection([np.asarray(p, np.float64) for p in polygons], manifold3d.FillRule.NonZero)
+    low, high = 0.0, float(np.ptp(polygons.reshape(-1, 2), axis=0).min()) / 2
+    while high - low > CIRCLE_MM / 2:
+        middle = (low + high) / 2
+        left = plan.offset(-middle, manifold3d.JoinType.Round, circular_segments=CIRCLE_SEGMENTS)
+        low, high = (low, middle) if left.is_empty() else (middle, high)
+    return low + high
 
 
 def triangulated(outline: Floats) -> Ints:

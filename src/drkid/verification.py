@@ -7,17 +7,23 @@ from pathlib import Path
 
 import numpy as np
 
+from drkid.assembly.structure import Structure
 from drkid.congruence.softest_mode import rigidity
 from drkid.export import KitDocument
-from drkid.export.layout import ASSEMBLED, BOM_CSV, BOM_JSON, PIECE_CLASS, SIMPLIFIED, SURFACE
+from drkid.export.document import FindingDocument
+from drkid.export.layout import ASSEMBLED, BOM_CSV, BOM_JSON, PIECE_CLASS, SIMPLIFIED, SURFACE, part_label
 from drkid.export.read_back import broken_file, read_document, read_mesh
 from drkid.intersection import self_intersections
-from drkid.kit import Building, Closure, Overlapping, Swing
+from drkid.kit import BRIDGE, Building, Closure, Overlapping, Swing
 from drkid.measure import bend_radians, dihedral
 from drkid.mesh import Floats, Ints, TriMesh
 from drkid.metrics import surface_distances
 from drkid.printed import structure_of
+from drkid.printed_plates import lying
+from drkid.printed_pockets import PocketRoom, pocket_figures
+from drkid.process import ProcessPreset
 from drkid.solid import Solid
+from drkid.spec import KitSpec
 
 RELATIVE = 1e-6  # of a recomputed length: PLY and JSON keep full double precision
 DISTANCE_PERCENT = 0.02  # of the diagonal: what two samplings of a surface may differ by
@@ -26,6 +32,8 @@ PLACEMENT_MM = 0.02
 PRINTED_MM = 1e-4  # between corners and stated lengths: single precision in the STL files is no better
 ASSEMBLED_MM, ASSEMBLED_SHARE = 1e-3, 0.01  # what a relaxation that is begun from rounded figures may differ by
 SWING_DEGREES = 0.1  # a corner in single precision, seen from an axis a fraction of a mm away
+POCKET_SHARE = 1e-4  # of a pocket's volume: by how much two may differ, in volume or shape
+CLEARANCE_MM = 1e-3  # what the facets of round connectors may take from a clearance
 SINGULAR_VALUE = 1e-6  # of the rigidity matrix: below it is rounding, a square root of it
 
 
@@ -80,6 +88,7 @@ def verify_kit(folder: str | Path) -> Verification:
         _parts(folder, kit),
         *_together(folder, assembled, kit),
         _parts_list(folder, kit),
+        *_plates(folder, kit),
     )
     return Verification(folder, checks)
 
@@ -284,11 +293,39 @@ def _together(folder: Path, mesh: TriMesh, kit: KitDocument) -> list[Check]:
         return [_closes(closure, kit), Check("building", passed=False, detail="the order is not one of all pieces")]
     last = structure.insertion(float(kit.spec["thickness_mm"]), order[-1:])
     return [
+        *_pockets(structure, kit),
         _closes(closure, kit),
         *_closure(closure, kit),
         _swings(swing, kit),
         _overlaps(structure.overlapping(float(kit.spec["swing_degrees"])), kit),
         _builds(structure.building(order, last), kit),
+    ]
+
+
+def _pockets(structure: Structure, kit: KitDocument) -> list[Check]:
+    """All pockets are one, with the stated clearance; nothing to ask of a kit without, or of curved pieces.
+
+    Around a curved piece's pocket neither its faces nor its bevels are plane, so that they cannot be told from it.
+    """
+    if not structure.connectors or kit.metrics.curved is not None:
+        return []
+    clearance, wall, thickness = (float(kit.spec[f"{name}_mm"]) for name in ("clearance", "min_wall", "thickness"))
+    names = [part_label(part.file) for one in kit.classes for part in one.parts]
+    room = PocketRoom(clearance, wall, thickness, _preset(kit).draft_degrees, kit.metrics.merged is not None)
+    try:
+        found = pocket_figures(structure.shapes, names, structure.connectors, room)
+    except ValueError as error:
+        return [Check("pockets are alike", passed=False, detail=str(error))]
+    crowded = f", but {found.crowded} with another within their walls" if found.crowded else ""
+    told = (
+        f"{found.pockets}{crowded} of {found.volume_mm3:.4g} mm³: volumes within {found.volume_share:.1g}, shapes "
+        f"within {found.shape_share:.1g} of that (limit {POCKET_SHARE:g}); farthest apart {' and '.join(found.between)}"
+    )
+    alike = max(found.volume_share, found.shape_share) <= POCKET_SHARE
+    least = f"connectors {found.clearance_mm:.4g} mm clear of their pockets, stated {clearance:g}"
+    return [
+        Check("pockets are alike", alike, told),
+        Check("clearance of the pockets", abs(found.clearance_mm - clearance) <= CLEARANCE_MM, least),
     ]
 
 
@@ -356,6 +393,33 @@ def _builds(building: Building, kit: KitDocument) -> Check:
         return Check("building", building.last_goes_in, told)
     same = stated.building.last_goes_in == building.last_goes_in and stated.building.enclosed == building.enclosed
     return Check("building", same and _near(stated.building.border_mean_mm, building.border_mean_mm), told)
+
+
+def _plates(folder: Path, kit: KitDocument) -> list[Check]:
+    """Everything lies on its bed, and bridges no more than the process can, unless a finding says so."""
+    found = lying(folder)
+    if not found:
+        return []
+    worst, preset = max(found, key=lambda one: one.bridge_mm), _preset(kit)
+    told = {f.subject.removeprefix("class ").replace("(", "").replace(")", "") for f in kit.findings if _is_too_wide(f)}
+    limit = np.inf if preset.longest_bridge_mm is None else preset.longest_bridge_mm + CLEARANCE_MM
+    untold = [one for one in found if one.bridge_mm > limit and one.name.replace("_", " ") not in told]
+    bad = "; ".join(f"{one.name}: {one.bridge_mm:.2f} mm is not told" for one in untold)
+    needed = "any prints" if preset.longest_bridge_mm is None else f"at most {preset.longest_bridge_mm:g}"
+    widest = f"widest {worst.bridge_mm:.2f} mm, of {worst.name}; {needed}"
+    off, items = max(one.above_bed_mm for one in found), sum(one.copies for one in found)
+    return [
+        Check("bridges on the plates", not untold, bad or widest),
+        Check("plates", off <= CLEARANCE_MM, f"{items} items, within {off:.1g} mm of the bed"),
+    ]
+
+
+def _is_too_wide(finding: FindingDocument) -> bool:
+    return finding.what == BRIDGE and finding.available > finding.needed
+
+
+def _preset(kit: KitDocument) -> ProcessPreset:
+    return KitSpec.parse({name: kit.spec.get(name) for name in ("process", "process_values")}).preset
 
 
 def _near(stated_mm: float, found_mm: float) -> bool:

@@ -12,9 +12,9 @@ from drkid.export.bill_of_materials import bom_csv, bom_json, connector_row, pie
 from drkid.export.colour import COLOURS, class_colour
 from drkid.export.layout import connector_file, part_file, part_label, picture_file, plate_file
 from drkid.export.ply import ply_bytes
-from drkid.export.stl import rounded, stl_bytes
+from drkid.export.stl import stl_bytes
 from drkid.kit import class_id
-from drkid.mesh import TriMesh
+from drkid.mesh import TriMesh, rounded
 from drkid.solid import Solid
 from drkid.spec import KitSpec
 
@@ -87,10 +87,10 @@ def test_parts_list_is_the_same_in_csv_and_json():
 
 def test_names_of_files():
     assert [class_id(i) for i in (0, 25, 26, 51, 52, 701, 702)] == ["A", "Z", "AA", "AZ", "BA", "ZZ", "AAA"]
-    assert part_file(1, "any") == "parts/B.stl"
-    assert part_file(1, "left") == "parts/B_left.stl"
-    assert part_file(0, "any", 2) == "parts/A2.stl"
-    assert part_file(0, "right", 1) == "parts/A1_right.stl"
+    assert part_file("B", "any") == "parts/B.stl"
+    assert part_file("B", "left") == "parts/B_left.stl"
+    assert part_file("A2", "any") == "parts/A2.stl"
+    assert part_file("A1", "right") == "parts/A1_right.stl"
     assert connector_file("connector_half") == "parts/connector_half.stl"
     assert plate_file(3) == "plates/plate_03.3mf"
     assert picture_file("parts/A2_left.stl") == "pictures/A2_left.png"

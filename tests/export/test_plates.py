@@ -2,6 +2,7 @@
 
 import csv
 import io
+import re
 from dataclasses import replace
 from itertools import combinations
 
@@ -13,8 +14,10 @@ from drkid.errors import FitError
 from drkid.export.bill_of_materials import bom_csv
 from drkid.export.kit_document import bom_rows, printed_meshes
 from drkid.export.plates import plate_files, plates
-from drkid.export.print_orientation import print_orientation, widest_bridge_mm
+from drkid.export.three_mf import read_three_mf
+from drkid.kit import BRIDGE
 from drkid.mesh import TriMesh
+from drkid.print_orientation import print_orientation, widest_bridge_mm
 from drkid.solid import Solid
 
 
@@ -102,13 +105,15 @@ def test_nothing_needs_support(kit):
         assert widest_bridge_mm(mesh.moved(mesh.vertices @ turn.T)) < 3
 
 
-def test_a_pocketed_slab_is_printed_with_its_pocket_up():
-    slab = Solid.box([0, 0, 0], [30, 30, 6]) - Solid.box([8, 8, -1], [22, 22, 4])
-    mesh = slab.mesh()
-    turn = print_orientation(mesh)
-    assert turn @ [0, 0, -1] == pytest.approx([0, 0, 1])
-    assert widest_bridge_mm(mesh) == pytest.approx(14)
-    assert widest_bridge_mm(mesh.moved(mesh.vertices @ turn.T)) == 0
+def test_findings_tell_the_bridges_of_all_that_lies_on_the_plates(kit, written):
+    told = {f.subject.removeprefix("class "): f.available for f in kit.part_set.findings if f.what == BRIDGE}
+    for content in written.values():
+        for one in read_three_mf(content):
+            name = re.sub("_(left|right)$", r" (\1)", one.name).replace("_", " ")
+            for matrix in one.transforms:
+                lying = one.mesh.moved(one.mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3])
+                assert widest_bridge_mm(lying) == pytest.approx(told[name], abs=0.02)
+    assert len(told) == len(kit.part_set.parts) + 1
 
 
 @pytest.mark.parametrize("bed", [(25.0, 25.0, 250.0), (220.0, 220.0, 4.0)])

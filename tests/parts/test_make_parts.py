@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drkid.errors import FitError
-from drkid.export.stl import rounded, stl_bytes
-from drkid.kit import Decomposition, PartSet
+from drkid.export.stl import stl_bytes
+from drkid.kit import Decomposition, PartSet, class_id
 from drkid.measure import bend_radians
-from drkid.mesh import TriMesh
+from drkid.mesh import TriMesh, rounded
 from drkid.parts import make_parts
 from drkid.parts.pocket import pocket
 from drkid.spec import PROCESSES, KitSpec
@@ -229,17 +229,22 @@ def test_a_joint_beyond_the_given_bends_is_refused_with_its_place_and_angle() ->
 
 
 @pytest.mark.parametrize("count", [1, 2])
-def test_variants_are_parts_of_their_class_and_narrow_the_grooves(count) -> None:
+def test_variants_are_classes_of_their_own_and_narrow_the_grooves(count) -> None:
     d = decomposed(potato(3), 4)
     one, made = make_parts(d, KitSpec(size_mm=200)), make_parts(d, KitSpec(size_mm=200, bevel_variants=count))
     assert [part.class_index for part in made.parts] == sorted(part.class_index for part in made.parts)
-    assert {part.variant for part in made.parts} == ({0} if count == 1 else {1, 2})
+    assert {part.name[1:] for part in made.parts} == ({""} if count == 1 else {"1", "2"})
     assert made.groove_mm.mean() <= one.groove_mm.mean()
     chosen = made.groove_choices[count - 1]
     assert (chosen.bevel_variants, chosen.moulds) == (count, len(made.parts))
     assert chosen.mean_mm == pytest.approx(made.groove_mm.mean())
     assert chosen.max_mm == pytest.approx(made.groove_mm.max())
-    assert (np.array([p.class_index for p in made.parts])[made.face_part] == d.face_class).all()
+    split = made.by_parts(d)
+    assert len(split.class_lengths) == count * len(d.class_lengths)
+    assert (split.class_lengths[split.face_class] == d.class_lengths[d.face_class]).all()
+    assert (split.face_class == np.array([p.class_index for p in made.parts])[made.face_part]).all()
+    assert [part.name[0] for part in made.parts] == [class_id(made.split_class[p.class_index] if made.split_class
+                                                              else p.class_index) for p in made.parts]  # fmt: skip
 
 
 def test_scale_of_the_source_does_not_matter_at_a_fixed_size() -> None:

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from exact_shapes import decomposed, sixths
+from exact_shapes import decomposed, potato, sixths
 
 from drkid.parts import make_parts
 from drkid.parts.marks import _engraving, marks, side_ranks
@@ -13,20 +13,30 @@ def kit():
     return make_parts(decomposed(sixths()), KitSpec(size_mm=260, marks=False))
 
 
+@pytest.mark.parametrize("process", ["fdm", "sla", "injection"])
 @pytest.mark.parametrize("connector", ["hinge", "box"])
-def test_marks_keep_the_wall_to_every_pocket(kit, connector) -> None:
-    if connector == "box":  # its pockets lean inwards, and are deepest above the engraving
-        kit = make_parts(decomposed(sixths()), KitSpec(marks=False, connector="box"))
+def test_marks_keep_the_wall_to_every_pocket_at_the_smallest_size(connector, process) -> None:
+    """A key's pockets lean inwards, and are deepest above the engraving; letters there fill the room that there is."""
+    spec = KitSpec(marks=False, connector=connector, process=process)
+    width, depth = spec.preset.engrave_width_mm, spec.preset.mark_depth_mm
+    kit = make_parts(decomposed(potato(3), 4), spec)
     d = kit.dimensions
+    nearest = np.inf
     for part in kit.parts:
-        found = marks(part, d, 0.6, 0.4)
-        assert connector == "box" or found.missing == ()
-        assert len(found.letter)
+        found = marks(part, d, width, depth)
         low = -d.thickness_mm / 2
-        cut = _engraving(np.concatenate([found.letter, found.ticks]), 0.6, low, low + 0.4)
+        cut = _engraving(np.concatenate([found.letter, found.ticks]), width, low, low + depth)
+        assert not cut.is_empty
         assert (cut - part.solid).volume < 1e-9
-        for frame in part.side_frames:
-            assert pocket(d).moved(frame).gap(cut, 5.0) >= d.min_wall_mm
+        nearest = min(nearest, *(pocket(d).moved(frame).gap(cut, 5.0) for frame in part.side_frames))
+    assert d.min_wall_mm <= nearest < d.min_wall_mm + 0.3
+
+
+def test_a_large_piece_has_room_for_all_its_marks(kit) -> None:
+    for part in kit.parts:
+        found = marks(part, kit.dimensions, 0.6, 0.4)
+        assert found.missing == ()
+        assert len(found.letter)
 
 
 def test_ticks_count_the_sides_by_length(kit) -> None:

@@ -1,8 +1,9 @@
 """coupon.stl."""
 
 from drkid.export.layout import COUPON
-from drkid.export.stl import rounded, stl_bytes
+from drkid.export.stl import stl_bytes
 from drkid.kit import Kit
+from drkid.mesh import rounded
 
 
 def coupon_files(kit: Kit) -> dict[str, bytes]:

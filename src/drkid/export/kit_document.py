@@ -12,16 +12,15 @@ from drkid.curved_patch import barycentric_grid
 from drkid.export import document as doc
 from drkid.export.bill_of_materials import Moulding, Row, connector_row, moulding, piece_row, rod_row
 from drkid.export.layout import connector_file, part_file
-from drkid.export.stl import rounded
-from drkid.kit import Distance, Kit, Metrics, Part, class_id
-from drkid.mesh import Floats, TriMesh
+from drkid.kit import Distance, Kit, Metrics, Part
+from drkid.mesh import Floats, TriMesh, rounded
 
 MOST_RECORDS = 500  # of the convergence history; a plot shows no more
 
 
 def part_name(part: Part) -> str:
     """The file of a part."""
-    return part_file(part.class_index, part.handedness, part.variant)
+    return part_file(part.name, part.handedness)
 
 
 def connector_names(kit: Kit) -> list[str]:
@@ -43,7 +42,7 @@ def kit_document(kit: Kit) -> doc.KitDocument:
             doc.PieceDocument(
                 face=None if merged else piece.face,
                 faces=list(piece.faces) if merged else None,
-                class_=class_id(kit.part_set.parts[piece.part].class_index),
+                class_=kit.part_set.parts[piece.part].name,
                 part=part_name(kit.part_set.parts[piece.part]),
                 corners=list(piece.vertices),
                 transform=_flat(piece.transform),
@@ -80,11 +79,15 @@ def _patches(kit: Kit) -> list[doc.PatchDocument] | None:
         return None
     grid = barycentric_grid(kit.spec.subdivision_levels)
     scale = kit.part_set.scale_mm_per_unit
+    names = {part.class_index: part.name for part in kit.part_set.parts}
+    owners = kit.part_set.split_class or range(len(kit.patches.curved))
     return [
         doc.PatchDocument(
-            class_=class_id(k), vertices=patch.scaled(scale).points(grid.points).tolist(), faces=grid.faces.tolist()
+            class_=names[k],
+            vertices=kit.patches.curved[owner].scaled(scale).points(grid.points).tolist(),
+            faces=grid.faces.tolist(),
         )
-        for k, patch in enumerate(kit.patches.curved)
+        for k, owner in enumerate(owners)
     ]
 
 
@@ -139,7 +142,7 @@ def _classes(kit: Kit, counts: Counter[int]) -> list[doc.ClassDocument]:
         parts = [kit.part_set.parts[i] for i in numbers]
         classes.append(
             doc.ClassDocument(
-                id=class_id(index),
+                id=parts[0].name,
                 count=sum(counts[i] for i in numbers),
                 edge_lengths=[x for x in lengths if not isnan(x)],
                 mirror_symmetric=parts[0].handedness == "any",

@@ -1,7 +1,5 @@
 """Where everything lies in a kit folder: the only place that knows a file's name."""
 
-from drkid.kit import class_id
-
 KIT_JSON = "kit.json"
 SURFACE = "surface.ply"
 SIMPLIFIED = "simplified.ply"
@@ -20,11 +18,10 @@ REPORT = "report.html"
 COUPON = "coupon.stl"
 
 
-def part_file(index: int, handedness: str, variant: int = 0) -> str:
-    """File of a class's part: its letter, the number of its bevel where it has several, its hand where hands differ."""
-    number = variant or ""
+def part_file(name: str, handedness: str) -> str:
+    """File of a class's part: the class's name, and the part's hand where hands differ."""
     hand = "" if handedness == "any" else f"_{handedness}"
-    return f"{PARTS}/{class_id(index)}{number}{hand}.stl"
+    return f"{PARTS}/{name}{hand}.stl"
 
 
 def connector_file(name: str) -> str:

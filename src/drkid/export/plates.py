@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from itertools import groupby
+from math import inf
 
 import numpy as np
 
@@ -10,10 +11,10 @@ from drkid.export.bill_of_materials import Row
 from drkid.export.kit_document import bom_rows, printed_meshes
 from drkid.export.layout import plate_file
 from drkid.export.packing import Place, Shape, Sheet, hull_outline, pack, rotation
-from drkid.export.print_orientation import print_orientation
 from drkid.export.three_mf import PlateObject, three_mf_bytes
 from drkid.kit import Kit
 from drkid.mesh import Floats, TriMesh
+from drkid.print_orientation import print_orientation
 
 MARGIN_MM = 5.0  # kept free along the bed's border: for a brim and the printer's clips
 SPACING_MM = 2.0  # between items: so that each is its own island and a hand can take it off
@@ -50,10 +51,11 @@ def plates(kit: Kit) -> tuple[Plate, ...]:
     rows = [row for row in bom_rows(kit, {name: mesh.volume for name, mesh in meshes.items()}) if row.file]
     bed = kit.spec.bed_mm
     sheet = Sheet(bed[0], bed[1], _margin_mm(kit), SPACING_MM)
+    longest = kit.spec.preset.longest_bridge_mm or inf
     found: list[Plate] = []
     for _, group in groupby(rows, key=lambda row: row.colour):
         own = list(group)
-        turns = [print_orientation(meshes[row.file]) for row in own]
+        turns = [print_orientation(meshes[row.file], longest) for row in own]
         found += _packed(own, [meshes[row.file] for row in own], turns, sheet, bed[2])
     return tuple(found)
 

@@ -47,6 +47,34 @@ def three_mf_bytes(title: str, objects: Sequence[PlateObject]) -> bytes:
     return bytes(model.QueryWriter("3mf").WriteToBuffer())
 
 
+def read_three_mf(content: bytes) -> list[PlateObject]:
+    """The mesh objects of a 3MF, each with the matrices of its build items; colours are left out.
+
+    Raises:
+        ValueError: it is no 3MF, or an item is none of its meshes.
+    """
+    model: Any = lib3mf.Wrapper().CreateModel()
+    try:
+        model.QueryReader("3mf").ReadFromBuffer(content)
+        items = model.GetBuildItems()
+        found: dict[int, tuple[str, TriMesh, list[Floats]]] = {}
+        while items.MoveNext():
+            item = items.GetCurrent()
+            number = item.GetObjectResourceID()
+            if number not in found:
+                stored = model.GetMeshObjectByID(number)
+                vertices = np.array([list(p.Coordinates) for p in stored.GetVertices()], np.float64)
+                faces = np.array([list(t.Indices) for t in stored.GetTriangleIndices()], np.int64)
+                found[number] = stored.GetName(), TriMesh(vertices, faces), []
+            matrix = np.eye(4)
+            matrix[:3] = np.array([list(row) for row in item.GetObjectTransform().Fields], np.float64).T
+            found[number][2].append(matrix)
+    except lib3mf.ELib3MFException as error:
+        message = str(error)
+        raise ValueError(message) from error
+    return [PlateObject(name, "", mesh, transforms) for name, mesh, transforms in found.values()]
+
+
 def _added(model: Any, mesh: TriMesh) -> Any:
     """The mesh as an object of the model; its structures are filled in one go."""
     stored = model.AddMeshObject()

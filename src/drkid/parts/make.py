@@ -10,7 +10,7 @@ import numpy as np
 from drkid.class_triangle import LEFT_CORNERS, is_mirror_symmetric, laid_down, printed_lengths
 from drkid.curved_patch import CurvedPatch
 from drkid.errors import FitError
-from drkid.kit import Connector, Decomposition, Dimensions, Handedness, Part, PartSet, Patches, class_id
+from drkid.kit import Connector, Decomposition, Dimensions, Handedness, Part, PartSet, Patches
 from drkid.mesh import Floats, Ints, read_only
 from drkid.parts.bevel import require_bends
 from drkid.parts.bevel_variants import Moulds, moulds
@@ -28,7 +28,7 @@ from drkid.parts.members import Members
 from drkid.parts.notes import connector_notes, corner_notes, groove_notes, notes
 from drkid.parts.pocket import pocket, side_frames
 from drkid.parts.prismoid import Prismoid
-from drkid.parts.process_findings import findings
+from drkid.parts.process_findings import bridge_findings, findings
 from drkid.parts.snap import snap_half
 from drkid.parts.thickening import thickened
 from drkid.parts.truncation import Truncated, truncated
@@ -99,10 +99,13 @@ def make_parts(
         coupon=coupon(design.dimensions, spec),
         cut_corners=corners.corners,
         deepest_cut_mm=corners.deepest_mm,
+        split_class=tuple(found.class_index.tolist()) if found.variant.any() else (),
     )
     if merged is not None:
         part_set = merged_parts(merged, part_set, spec, tuple(connector_notes(members, design.dimensions)))
     part_set = _marked(part_set, spec)
+    bridges = bridge_findings(part_set.parts, part_set.connectors, spec)
+    part_set = replace(part_set, findings=(*part_set.findings, *bridges))
     for part in part_set.parts:
         _require_bed(part, spec)
     progress("cutting parts", 1.0)
@@ -325,15 +328,14 @@ def _right_part(design: _Design, index: int, shape: Prismoid, scale: float) -> P
         solid = solid.minus_all([pocket(design.dimensions).moved(frame) for frame in frames])
     symmetric = is_mirror_symmetric(design.decomposition.class_lengths[index])
     hand: Handedness = "any" if symmetric else "right"
-    own, variant = int(design.moulds.class_index[index]), int(design.moulds.variant[index])
-    return Part(own, hand, _flat(triangle), frames, solid, variant)
+    return Part(index, hand, _flat(triangle), frames, solid, design.moulds.name(index))
 
 
 def _mirrored(right: Part, dimensions: Dimensions) -> Part:
     """The left part of a class: the mirror image of the right one, first side along x again."""
     triangle = (right.corners[:, :2] * [-1, 1])[list(LEFT_CORNERS)]
     frames = side_frames(triangle, dimensions.key_bend_degrees / 2)
-    return Part(right.class_index, "left", _flat(triangle), frames, right.solid.moved(MIRROR), right.variant)
+    return Part(right.class_index, "left", _flat(triangle), frames, right.solid.moved(MIRROR), right.class_name)
 
 
 def _marked(part_set: PartSet, spec: KitSpec) -> PartSet:
@@ -370,7 +372,7 @@ def _require_bed(part: Part, spec: KitSpec) -> None:
     size = np.sort(np.ptp(part.solid.bounds, axis=0))
     if (size > np.sort(spec.bed_mm)).any():
         raise FitError(
-            f"a piece of class {class_id(part.class_index)} is larger than the printer's bed",
+            f"a piece of class {part.name} is larger than the printer's bed",
             wanted=" × ".join(f"{x:g}" for x in spec.bed_mm) + " mm at most",
             found=" × ".join(f"{x:.1f}" for x in size) + " mm",
             remedy="a smaller print (--size-mm), more pieces (--faces), or a larger bed (--bed-mm)",

@@ -26,6 +26,7 @@ MOST_SHIFTS = 16.0  # how far from its pocket a tick may stand, in stroke widths
 SAMPLES = 0.5  # of a stroke's width between the points at which it is tested
 ROUND = 8  # corners of a stroke's end
 SKIN_MM = 0.01  # how far inside the inner face the section is taken
+BETWEEN_MM = 0.02  # what straight lines between nodes, and samples of strokes, may take from a distance
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +115,7 @@ def _ground(part: Part, d: Dimensions, width_mm: float, depth_mm: float) -> _Gro
     sections = [_segments(part.solid.cross_section(z)) for z in sorted(heights)]
     low, high = sections[0].min(axis=(0, 1)), sections[0].max(axis=(0, 1))
     ground = _Ground(low, np.zeros(np.ceil((high - low) / STEP_MM).astype(int) + 1))
-    room = np.min([_inside_distance(ground.nodes, s) for s in sections], axis=0) - (needed + width_mm / 2 + SKIN_MM)
+    room = np.min([_inside_distance(ground.nodes, s) for s in sections], axis=0) - (needed + width_mm / 2 + BETWEEN_MM)
     return _Ground(low, room.reshape(ground.room_mm.shape))
 
 

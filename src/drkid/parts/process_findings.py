@@ -1,15 +1,17 @@
 """What the process needs of every piece and connector, beside what they have: walls, draft, undercuts, overhangs."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from drkid.kit import Dimensions, Finding
-from drkid.mesh import Floats
+from drkid.kit import BRIDGE, Connector, Dimensions, Finding, Part
+from drkid.mesh import Floats, rounded
 from drkid.parts.bevel_variants import Moulds
 from drkid.parts.fit import margins
 from drkid.parts.pocket import deepest_height_mm, depth_mm
 from drkid.parts.prismoid import Prismoid
+from drkid.print_orientation import print_orientation, widest_bridge_mm
+from drkid.solid import Solid
 from drkid.spec import KitSpec
 
 
@@ -32,6 +34,31 @@ def findings(
         found += _walls(subject, triangles[k], pieces[k], dimensions)
         found += _sides(subject, triangles[k], pieces[k], spec)
     return (*found, *_process(dimensions, spec))
+
+
+def bridge_findings(parts: Sequence[Part], connectors: Sequence[Connector], spec: KitSpec) -> Iterator[Finding]:
+    """The widest bridge of everything that is printed, turned as the build plates have it."""
+    longest = spec.preset.longest_bridge_mm
+    if longest is None:
+        return
+    found: dict[int, float] = {}  # what is as wide in a part's mirror image
+    for part in parts:
+        if part.class_index not in found:
+            found[part.class_index] = _bridge_mm(part.solid, longest)
+        hand = "" if part.handedness == "any" else f" ({part.handedness})"
+        yield _bridge(f"class {part.name}{hand}", longest, found[part.class_index])
+    for one in connectors:
+        yield _bridge(one.name.replace("_", " "), longest, _bridge_mm(one.solid, longest))
+
+
+def _bridge_mm(solid: Solid, longest_mm: float) -> float:
+    mesh = rounded(solid.mesh())
+    turn = print_orientation(mesh, longest_mm)
+    return widest_bridge_mm(mesh.moved(mesh.vertices @ turn.T))
+
+
+def _bridge(subject: str, longest_mm: float, bridge_mm: float) -> Finding:
+    return Finding(subject, BRIDGE, longest_mm, bridge_mm, "mm", "at most", "print it with supports")
 
 
 def _walls(subject: str, triangle: Floats, piece: Prismoid, dimensions: Dimensions) -> Iterator[Finding]:

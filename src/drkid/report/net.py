@@ -12,7 +12,7 @@ from reportlab.pdfgen.canvas import Canvas
 from drkid.export.colour import class_colour
 from drkid.export.layout import NET_PDF, NET_SVG
 from drkid.export.packing import Shape, Sheet, hull_outline, pack, rotation
-from drkid.kit import Kit, class_id
+from drkid.kit import Kit
 from drkid.mesh import Floats
 from drkid.report.unfolding import Fold, Strip, flattened, overlapping, unfold, upright
 from drkid.solid import triangulated
@@ -47,6 +47,7 @@ class Face:
     piece: int
     step: int
     class_index: int
+    class_name: str
     outline: Floats
 
 
@@ -210,10 +211,10 @@ def _drawn(kit: Kit, strip: Strip, tabs: tuple[Floats, ...], joints: list[Fold],
     labels: list[Label] = []
     for number, outline in strip.outlines.items():
         piece = kit.assembly.pieces[number]
-        index = kit.part_set.parts[piece.part].class_index
+        part = kit.part_set.parts[piece.part]
         step = steps.get(piece.face, number + 1)
-        faces.append(Face(number, step, index, outline))
-        text = f"{class_id(index)} {step}"
+        faces.append(Face(number, step, part.class_index, part.name, outline))
+        text = f"{part.name} {step}"
         height = min(_label_height(outline), MOST_TEXT * _mean_side(outline) / len(text))
         labels.append(Label(text, outline.mean(axis=0), height))
     lines: list[Line] = []
@@ -316,7 +317,7 @@ def _svg_page(net: Net, number: int, page: Page) -> Iterator[str]:
     for face in page.faces:
         fill = _tint(class_colour(face.class_index))
         yield (
-            f'<polygon class="face" data-class="{class_id(face.class_index)}" data-piece="{face.piece}" '
+            f'<polygon class="face" data-class="{face.class_name}" data-piece="{face.piece}" '
             f'data-step="{face.step}" fill="{fill}" points="{" ".join(map(point, face.outline))}"/>'
         )
     for line in page.lines:
