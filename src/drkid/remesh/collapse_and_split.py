@@ -261,7 +261,7 @@ def _figures(mesh: TriMesh, fit: SurfaceFit) -> _Figures:
     return _Figures(
         int((~np.isin(mesh.valence, (5, 6, 7))).sum()),
         int(_beyond_band(mesh, fit).sum()),
-        _relative_spread(mesh, fit),
+        relative_spread(mesh, fit),
         smallest_angle_degrees(mesh),
         float(np.degrees(np.abs(bend_radians(mesh)).max())),
         float(max(out.max(), back.max())),
@@ -273,7 +273,8 @@ def _relative(mesh: TriMesh, fit: SurfaceFit) -> Floats:
     return mesh.edge_lengths / goals(mesh, fit.sizing)[mesh.edges].mean(axis=1)
 
 
-def _relative_spread(mesh: TriMesh, fit: SurfaceFit) -> float:
+def relative_spread(mesh: TriMesh, fit: SurfaceFit) -> float:
+    """Standard deviation over mean of the edges' lengths, each over the length that is wanted there."""
     relative = _relative(mesh, fit)
     return float(relative.std() / relative.mean())
 
@@ -296,7 +297,7 @@ def collapsed_and_split(mesh: TriMesh, fit: SurfaceFit) -> TriMesh:
     pairs together raise the spread of the edges by 15 % at most.
     The mesh is closed and manifold and stays so, with its genus and its number of vertices.
     """
-    most_spread = MOST_SPREAD * _relative_spread(mesh, fit)
+    most_spread = MOST_SPREAD * relative_spread(mesh, fit)
     for _ in range(MOST_PAIRS):
         better = _with_a_pair(mesh, fit, most_spread) if is_flawed(mesh, fit) else None
         if better is None:

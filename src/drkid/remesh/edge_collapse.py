@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from drkid.mesh import Floats, Ints, TriMesh
+from drkid.mesh import Floats, Ints, TriMesh, summed
 from drkid.remesh.half_edge import (
     HalfEdges,
     Index,
@@ -124,10 +124,8 @@ def _vertex_quadrics(mesh: TriMesh) -> Floats:
     offset = np.einsum("ij,ij->i", mesh.face_normals, mesh.corners[:, 0])
     plane = np.column_stack([mesh.face_normals, -offset])
     quadric = plane[:, :, None] * plane[:, None, :] * (mesh.areas / 3)[:, None, None]
-    total = np.zeros((len(mesh.vertices), 4, 4))
-    for corner in range(3):
-        np.add.at(total, mesh.faces[:, corner], quadric)
-    return total
+    thrice = np.tile(quadric.reshape(-1, 16), (3, 1))
+    return summed(mesh.faces.T.ravel(), thrice, len(mesh.vertices)).reshape(-1, 4, 4)
 
 
 def _costs(edges: HalfEdges, vertices: Floats, quadrics: Floats) -> Floats:

@@ -2,7 +2,8 @@
 
 Flips let irregular vertices meet and vanish (`dislocation_glide`), least squares then place all vertices
 (`surface_fit`); each makes room for the other. Flaws that are left then are mended by pairs of collapses and splits
-(`collapse_and_split`); a mesh without any stays as it is.
+(`collapse_and_split`); a mesh without any stays as it is. The highest peaks of the distance are lowered last
+(`largest_distance`).
 """
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from drkid.mesh import TriMesh
 from drkid.remesh.collapse_and_split import collapsed_and_split
 from drkid.remesh.dislocation_glide import glide
+from drkid.remesh.largest_distance import lowered
 from drkid.remesh.surface_fit import SurfaceFit
 
 ROUNDS = 4  # of both; later ones find few flips that are worth while
@@ -29,4 +31,4 @@ def polished(mesh: TriMesh, fit: SurfaceFit, rng: np.random.Generator) -> TriMes
             mesh = fit.stepped(mesh)
     for _ in range(LAST_STEPS):
         mesh = fit.stepped(mesh)
-    return collapsed_and_split(mesh, fit)
+    return lowered(collapsed_and_split(mesh, fit), fit)

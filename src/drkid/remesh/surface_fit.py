@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from drkid.measure import sample
-from drkid.mesh import Floats, Ints, TriMesh
+from drkid.mesh import Floats, Ints, TriMesh, summed
 from drkid.remesh.closest_point import ClosestPoint
 from drkid.remesh.sizing_field import SizingField, goals
 from drkid.remesh.tangential_relaxation import moved_where_harmless
@@ -46,7 +46,8 @@ def _accumulate(count: int, points: "Points", share: Floats) -> tuple[Floats, Fl
 class System(NamedTuple):
     """Normal equations of one step, kept by face and by edge.
 
-    `matrix` (F, 9, 9) of each face's points, `along` (E, 3) the edges' directions, `stiffness` (E,) of the springs.
+    `matrix` (F, 9, 9) of each face's points, `along` (E, 3) the edges' directions, `stiffness` (E,) of the springs;
+    `fixed` are the vertices that stay.
     """
 
     faces: Ints
@@ -55,20 +56,11 @@ class System(NamedTuple):
     along: Floats
     stiffness: Floats
     damping: float
+    fixed: Ints
 
 
 @njit(cache=True)
-def _product(system: System, x: Floats, y: Floats) -> None:
-    # y = A x
-    faces, matrix, edges, along, stiffness, damping = system
-    for v, d in np.ndindex(x.shape):
-        y[v, d] = damping * x[v, d]
-    for f in range(len(faces)):
-        for row in range(9):
-            total = 0.0
-            for column in range(9):
-                total += matrix[f, row, column] * x[faces[f, column // 3], column % 3]
-            y[faces[f, row // 3], row % 3] += total
+def _add_pulls(edges: Ints, along: Floats, stiffness: Floats, x: Floats, y: Floats) -> None:
     for e in range(len(edges)):
         a, b, change = edges[e, 0], edges[e, 1], 0.0
         for d in range(3):
@@ -79,8 +71,25 @@ def _product(system: System, x: Floats, y: Floats) -> None:
 
 
 @njit(cache=True)
+def _product(system: System, x: Floats, y: Floats) -> None:
+    # y = A x
+    faces, matrix, edges, along, stiffness, damping, fixed = system
+    for v, d in np.ndindex(x.shape):
+        y[v, d] = damping * x[v, d]
+    for f in range(len(faces)):
+        for row in range(9):
+            total = 0.0
+            for column in range(9):
+                total += matrix[f, row, column] * x[faces[f, column // 3], column % 3]
+            y[faces[f, row // 3], row % 3] += total
+    _add_pulls(edges, along, stiffness, x, y)
+    for v in fixed:
+        y[v] = 0.0
+
+
+@njit(cache=True)
 def _diagonal(system: System, count: int) -> Floats:
-    faces, matrix, edges, along, stiffness, damping = system
+    faces, matrix, edges, along, stiffness, damping, _ = system
     found = np.full((count, 3), damping)
     for f in range(len(faces)):
         for row in range(9):
@@ -129,6 +138,26 @@ class Points(NamedTuple):
     share: Floats
 
 
+class Region(NamedTuple):
+    """The part of a mesh that a step moves.
+
+    `vertices` (v,) may move; `faces` (f,) and `edges` (e,) are those at them, `fixed` the other vertices of these.
+    `points` (p, 3) of the surface lie closest to these faces, `share` (p,) is the part of its area that each stands
+    for; `rule` (k, 3) are the points that are taken in each face. `mean_squares` of distances, and of the edges'
+    errors, are those of the whole mesh; distances count as `most_peak` times that at most.
+    """
+
+    vertices: Ints
+    fixed: Ints
+    faces: Ints
+    edges: Ints
+    points: Floats
+    share: Floats
+    rule: Floats = RULE
+    mean_squares: tuple[float, float] | None = None
+    most_peak: float = MOST_PEAK
+
+
 @dataclass(frozen=True, eq=False)
 class SurfaceFit:
     """A surface with what is needed to fit meshes to it: its tree, `points` (P, 3) spread over it, lengths of edges."""
@@ -144,43 +173,56 @@ class SurfaceFit:
         mean edge, and the mean squared relative error of the edges. A vertex stays where it is if one of its faces
         would turn by 90° or become a sliver or a fold.
         """
-        pairs = _joined(self._from_mesh(mesh), self._from_surface(mesh))
-        squares = pairs.away**2
-        mean_square = max(float((pairs.share * squares).sum()) / 2, np.finfo(float).tiny)
-        raised = 1 + PEAK * np.minimum(squares / mean_square, MOST_PEAK)
-        share = CLOSENESS / 2 * pairs.share * raised
-        matrix, gradient = _accumulate(len(mesh.faces), pairs, share)
-        right = np.zeros_like(mesh.vertices)
-        np.add.at(right, mesh.faces.ravel(), -gradient.reshape(-1, 3))
-        ends, lengths = mesh.vertices[mesh.edges], mesh.edge_lengths
-        along = (ends[:, 1] - ends[:, 0]) / lengths[:, None]
+        region = self._everywhere(mesh)
+        return self.placed(mesh, region, self.pairs(mesh, region))
+
+    def placed(self, mesh: TriMesh, region: Region, pairs: Points) -> TriMesh:
+        """The same step of a region's vertices alone, from its `pairs`."""
+        faces, edges, count = mesh.faces[region.faces], mesh.edges[region.edges], len(mesh.vertices)
         goal = goals(mesh, self.sizing)
-        wanted = goal[mesh.edges].mean(axis=1)
+        ends, lengths = mesh.vertices[edges], mesh.edge_lengths[region.edges]
+        along = (ends[:, 1] - ends[:, 0]) / lengths[:, None]
+        wanted = goal[edges].mean(axis=1)
         surplus, weight = lengths - wanted, (mesh.mean_edge / wanted) ** 2  # relative errors count
-        squares = weight * surplus**2
-        stiffness = weight * (1 + PEAK_EDGE * squares / max(float(squares.mean()), np.finfo(float).tiny)) / len(lengths)
+        squares, errors = pairs.away**2, weight * surplus**2
+        means = region.mean_squares or (float((pairs.share * squares).sum()) / 2, float(errors.mean()))
+        distance, error = (max(mean, np.finfo(float).tiny) for mean in means)
+        raised = 1 + PEAK * np.minimum(squares / distance, region.most_peak)
+        matrix, gradient = _accumulate(len(faces), pairs, CLOSENESS / 2 * pairs.share * raised)
+        stiffness = weight * (1 + PEAK_EDGE * errors / error) / len(mesh.edges)
         pull = (stiffness * surplus)[:, None] * along
-        np.add.at(right, mesh.edges[:, 0], pull)
-        np.add.at(right, mesh.edges[:, 1], -pull)
-        system = System(mesh.faces, matrix, mesh.edges, along, stiffness, DAMPING / len(mesh.vertices))
-        step = _conjugate_gradients(system, right)
+        right = summed(edges.T.ravel(), np.concatenate([pull, -pull]), count)
+        right -= summed(faces.ravel(), gradient.reshape(-1, 3), count)
+        right[region.fixed] = 0
+        step = _conjugate_gradients(
+            System(faces, matrix, edges, along, stiffness, DAMPING / count, region.fixed), right
+        )
         size = np.linalg.norm(step, axis=1, keepdims=True)
-        step *= np.minimum(1, REACH * goal[:, None] / np.maximum(size, np.finfo(float).tiny))
-        return moved_where_harmless(mesh, mesh.vertices + step)
+        most = REACH * goal[:, None]
+        return moved_where_harmless(mesh, mesh.vertices + step * (most / np.maximum(size, most)), region.vertices)
 
-    def _from_mesh(self, mesh: TriMesh) -> Points:
-        here = np.einsum("rc,fcd->frd", RULE, mesh.corners).reshape(-1, 3)
-        there, normals = self.closest(here)
-        count = len(mesh.faces)
-        share = (mesh.areas[:, None] / (len(RULE) * mesh.areas.sum()) * np.ones(len(RULE))).ravel()
-        away, direction = _signed(here, there, normals, self._rounding)
-        return Points(np.repeat(np.arange(count), len(RULE)), np.tile(RULE, (count, 1)), away, direction, share)
+    def pairs(self, mesh: TriMesh, region: Region) -> Points:
+        """Points of a region's faces with those closest to them on the surface, and the other way round."""
+        return _joined(self._from_mesh(mesh, region), self._from_surface(mesh, region))
 
-    def _from_surface(self, mesh: TriMesh) -> Points:
-        there, face, weights = ClosestPoint(mesh).in_faces(self.points)
-        away, direction = _signed(there, self.points, mesh.face_normals[face], self._rounding)
+    def _everywhere(self, mesh: TriMesh) -> Region:
+        vertices, faces, edges = (np.arange(len(array)) for array in (mesh.vertices, mesh.faces, mesh.edges))
         share = np.full(len(self.points), 1 / len(self.points))
-        return Points(face, weights, away, direction, share)
+        return Region(vertices, vertices[:0], faces, edges, self.points, share)
+
+    def _from_mesh(self, mesh: TriMesh, region: Region) -> Points:
+        here = np.einsum("rc,fcd->frd", region.rule, mesh.corners[region.faces]).reshape(-1, 3)
+        there, normals = self.closest(here)
+        count, rule = len(region.faces), region.rule
+        share = np.repeat(mesh.areas[region.faces] / (len(rule) * mesh.areas.sum()), len(rule))
+        away, direction = _signed(here, there, normals, self._rounding)
+        return Points(np.repeat(np.arange(count), len(rule)), np.tile(rule, (count, 1)), away, direction, share)
+
+    def _from_surface(self, mesh: TriMesh, region: Region) -> Points:
+        part = TriMesh(mesh.vertices, mesh.faces[region.faces])
+        there, face, weights = ClosestPoint(part).in_faces(region.points)
+        away, direction = _signed(there, region.points, part.face_normals[face], self._rounding)
+        return Points(face, weights, away, direction, region.share)
 
     @property
     def _rounding(self) -> float:

@@ -7,9 +7,9 @@ Strang, "A simple mesh generator in MATLAB" (SIAM Review 2004), for edges as spr
 import numpy as np
 from numba import njit
 
-from drkid.mesh import Floats, Ints, TriMesh
+from drkid.mesh import Floats, Ints, TriMesh, summed
 from drkid.remesh.closest_point import ClosestPoint
-from drkid.remesh.half_edge import dot, face_normal, following, half_edges, preceding, shape
+from drkid.remesh.half_edge import Index, dot, face_normal, following, half_edges, preceding, shape
 from drkid.remesh.sizing_field import SizingField, goals
 
 LEAST_SHAPE = 0.5  # of a face after the move, unless one was worse before
@@ -19,7 +19,7 @@ MOST_VALENCE = 64  # room for the faces around a vertex; one with more stays whe
 
 
 @njit(cache=True)
-def _look_around(origin: Ints, twin: Ints, vertices: Floats, h: int, normals: Floats) -> tuple[int, float, float]:
+def _look_around(origin: Ints, twin: Ints, vertices: Floats, h: Index, normals: Floats) -> tuple[int, float, float]:
     # Of the faces around a vertex: how many, the least shape, the least cosine with a neighbour, and their normals.
     count, least, fold = 0, 1.0, 1.0
     g = h
@@ -37,9 +37,9 @@ def _look_around(origin: Ints, twin: Ints, vertices: Floats, h: int, normals: Fl
 
 
 @njit(cache=True)
-def _move_where_harmless(origin: Ints, twin: Ints, start: Ints, vertices: Floats, targets: Floats) -> None:
+def _move_where_harmless(origin: Ints, twin: Ints, start: Ints, vertices: Floats, targets: Floats, which: Ints) -> None:
     before, after, was = np.empty((MOST_VALENCE, 3)), np.empty((MOST_VALENCE, 3)), np.empty(3)
-    for v in range(len(start)):
+    for v in which:
         count, shape_before, fold_before = _look_around(origin, twin, vertices, start[v], before)
         for d in range(3):
             was[d], vertices[v, d] = vertices[v, d], targets[v, d]
@@ -53,10 +53,10 @@ def _move_where_harmless(origin: Ints, twin: Ints, start: Ints, vertices: Floats
                 vertices[v, d] = was[d]
 
 
-def moved_where_harmless(mesh: TriMesh, targets: Floats) -> TriMesh:
-    """Vertices at `targets` (V, 3), each unless one of its faces would turn by 90° or become a sliver or a fold."""
+def moved_where_harmless(mesh: TriMesh, targets: Floats, which: Ints) -> TriMesh:
+    """The vertices `which` (n,) at `targets` (V, 3), unless a face would turn by 90° or become a sliver or a fold."""
     vertices = mesh.vertices.copy()
-    _move_where_harmless(*half_edges(mesh), vertices, targets)
+    _move_where_harmless(*half_edges(mesh), vertices, targets, which)
     return mesh.moved(vertices)
 
 
@@ -70,18 +70,17 @@ def relax(mesh: TriMesh, closest: ClosestPoint, rounds: int, sizing: SizingField
     kept.
     """
     edges = half_edges(mesh)
-    ends = np.concatenate([mesh.edges, mesh.edges[:, ::-1]])
+    ends, every = np.concatenate([mesh.edges, mesh.edges[:, ::-1]]), np.arange(len(mesh.vertices))
     for _ in range(rounds):
         vertices, normals = mesh.vertices.copy(), mesh.vertex_normals
         along = vertices[ends[:, 1]] - vertices[ends[:, 0]]
         goal = goals(mesh, sizing)[ends].mean(axis=1, keepdims=True)
         surplus = 1 - goal / np.linalg.norm(along, axis=1, keepdims=True)
-        step = np.zeros_like(vertices)
-        np.add.at(step, ends[:, 0], surplus * along)
+        step = summed(ends[:, 0], surplus * along, len(vertices))
         step *= STEP / mesh.valence[:, None]
         step -= np.einsum("ij,ij->i", step, normals)[:, None] * normals
         targets, facing = closest(vertices + step)
         same_side = np.einsum("ij,ij->i", facing, normals) > 0
-        _move_where_harmless(*edges, vertices, np.where(same_side[:, None], targets, vertices))
+        _move_where_harmless(*edges, vertices, np.where(same_side[:, None], targets, vertices), every)
         mesh = mesh.moved(vertices)
     return mesh

@@ -2,15 +2,14 @@
 
 import numpy as np
 
-from drkid.mesh import Floats, TriMesh
+from drkid.mesh import Floats, TriMesh, summed
 
 
 def signed_volumes(mesh: TriMesh) -> Floats:
     """(components,): signed volume of each edge-connected component, in the order of their numbers."""
     a, b, c = np.moveaxis(mesh.corners - mesh.vertices.mean(axis=0), 1, 0)
-    volumes = np.zeros(mesh.component_count)
-    np.add.at(volumes, mesh.face_component, np.einsum("ij,ij->i", a, np.cross(b, c)) / 6)
-    return volumes
+    volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
+    return summed(mesh.face_component, volumes[:, None], mesh.component_count)[:, 0]
 
 
 def outermost(mesh: TriMesh) -> tuple[TriMesh, int]:
