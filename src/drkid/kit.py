@@ -339,7 +339,8 @@ class PartSet:
     corner 0 lies at the face's corner `face_turn[f]`. `groove_mm` (E,) is each joint's widest visible gap;
     `groove_choices` is what bevels made for this shape alone, and further variants of them, would make of it.
     `coupon` is a fit test as it lies on the bed, None where there is no connector. `cut_corners` of the shapes are cut
-    off, by up to `deepest_cut_mm`, because pieces of one vertex would meet there.
+    off, by up to `deepest_cut_mm`, because pieces of one vertex would meet there. `patch_share` is what was left of the
+    height of curved patches.
     """
 
     scale_mm_per_unit: float
@@ -356,6 +357,7 @@ class PartSet:
     merged: tuple[MergedPiece, ...] = ()  # class_index is then the part's number; empty where each face is a piece
     cut_corners: int = 0
     deepest_cut_mm: float = 0.0
+    patch_share: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
