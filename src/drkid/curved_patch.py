@@ -34,6 +34,14 @@ class CurvedPatch:
         """All coordinates times `factor`."""
         return CurvedPatch(self.exponents, read_only(self.coefficients * factor))
 
+    def flattened(self, share: float) -> "CurvedPatch":
+        """The patch at this share of the way from its plane triangle, corners where they are."""
+        corners = (1 - share) * self.points(np.eye(3))
+        return CurvedPatch(
+            read_only(np.vstack([self.exponents, np.eye(3, dtype=np.int64)])),
+            read_only(np.vstack([share * self.coefficients, corners])),
+        )
+
 
 def monomials(exponents: Ints, barycentric: Floats) -> Floats:
     """(n, t): every term at barycentric coordinates (n, 3)."""

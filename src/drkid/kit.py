@@ -340,7 +340,8 @@ class PartSet:
     corner 0 lies at the face's corner `face_turn[f]`. `groove_mm` (E,) is each joint's widest visible gap;
     `groove_choices` is what bevels made for this shape alone, and further variants of them, would make of it.
     `coupon` is a fit test as it lies on the bed, None where there is no connector. `cut_corners` of the shapes are cut
-    off, by up to `deepest_cut_mm`, because pieces of one vertex would meet there.
+    off, by up to `deepest_cut_mm`, because pieces of one vertex would meet there. `patch_share` is what was left of the
+    height of curved patches.
 
     Where bevel variants split classes, each is a class of its own: `split_class` (m,) are the decomposition's classes
     that they come from, in their order; empty where no class is split.
@@ -361,6 +362,7 @@ class PartSet:
     cut_corners: int = 0
     deepest_cut_mm: float = 0.0
     split_class: tuple[int, ...] = ()
+    patch_share: float = 1.0
 
     def by_parts(self, decomposition: Decomposition) -> Decomposition:
         """The decomposition with the classes of the parts: the same one where no class is split."""

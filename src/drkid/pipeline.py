@@ -17,7 +17,7 @@ from drkid.kit import Decomposition, Kit, PartSet, Patches, Simplified, Surface
 from drkid.metrics import measure_kit
 from drkid.moulds import corrected_faces, faces_at_size, require_agreement, size_notes, with_moulds_of
 from drkid.parts import make_parts
-from drkid.patches import make_patches
+from drkid.patches import flattened_patches, make_patches
 from drkid.progress import Progress, StageProgress, nobody, silent
 from drkid.remesh import simplify
 from drkid.report import make_documents
@@ -68,6 +68,7 @@ def make_kit(source: str | Path | None = None, spec: KitSpec | None = None, prog
     unmerged = triangles if spec.merge else decomposition
     with stage("parts") as told:
         part_set = make_parts(unmerged, spec, told, patches)
+    patches = None if patches is None else flattened_patches(patches, part_set.patch_share, spec.subdivision_levels)
     scale = part_set.scale_mm_per_unit
     printed = _scaled(part_set.by_parts(decomposition), scale)
     with stage("assembly") as told:
@@ -193,8 +194,8 @@ def _resolved(spec: KitSpec, surface: Surface, unmerged: Decomposition, part_set
 
 
 def _mark_depth_mm(spec: KitSpec) -> float:
-    """How deep the marks of the pieces are: curved and merged ones bear none."""
-    if spec.patch == "curved" or spec.merge is not None:
+    """How deep the marks of the pieces are: merged ones bear none."""
+    if spec.merge is not None:
         return 0.0
     return spec.preset.mark_depth_mm if spec.mark_depth_mm is None else spec.mark_depth_mm
 

@@ -553,8 +553,6 @@ def _patch_contradiction(spec: KitSpec) -> str:
         return f"{name} is given and patch is flat: only --patch curved has curved pieces"
     if spec.curved == "published" and spec.curved_gap_mm is not None:
         return "curved_gap_mm is given and curved is published: only canonical patches keep to a gap"
-    if spec.patch == "curved" and spec.mark_depth_mm:
-        return f"mark_depth_mm is {spec.mark_depth_mm:g} and patch is curved: no plane is inside to engrave"
     return _merge_contradiction(spec)
 
 

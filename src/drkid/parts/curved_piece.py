@@ -1,153 +1,127 @@
-"""Curved piece: a patch with thickness, bevelled by the same planes as a flat one, with housings for its pockets.
+"""Curved piece: a curved outer face over the flat inner face, the bevels and the pockets of a flat piece.
 
 The hinge axes stay on the chords, the sides of the class triangle: the boundary curve leaves them by its sagitta, and
-two pieces still turn about one straight line. As the planes of the bevels also run through the chords, what keeps flat
-pieces apart at every bend keeps curved ones apart too.
+two pieces still turn about one straight line. The planes of the flat piece's bevels, which run through the chords, are
+carried on to the curved face: what keeps flat pieces apart at every bend keeps curved ones apart too. The outer face
+lies half the thickness over the patch, and all of a kit's by one lift more, where a patch dips so far under its
+triangle that a pocket would lose its roof. A curved piece therefore finds room where the flat one does; where its
+outer face does not, its patch is flattened.
 """
 
-from collections.abc import Callable
-
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from drkid.class_triangle import inward_normals
-from drkid.curved_patch import CurvedPatch, barycentric_grid
+from drkid.curved_patch import CurvedPatch, barycentric_grid, gradients
 from drkid.kit import Dimensions
-from drkid.mesh import Floats, TriMesh
-from drkid.parts.pocket import deepest_height_mm, depth_mm, flare_mm, side_frames
-from drkid.parts.prismoid import Prismoid, bevelled
+from drkid.mesh import Floats, Ints, TriMesh
+from drkid.parts.fit import Margin, inradius
+from drkid.parts.pocket import depth_mm, flare_mm, side_frames
+from drkid.parts.prismoid import Prismoid
 from drkid.solid import Solid
 
-NEWTON_STEPS = 12
-STEP_MM = 1e-4  # of the numerical derivatives
-LEFT_AROUND_HOUSING_MM = 0.1  # housings end behind the bevels, so that no two faces coincide
 FOOTPRINT_POINTS = 9  # in either direction, at which heights over a pocket are taken
+LEAST_PLATE_WALLS = 2.0  # thickness of a piece where its patch dips most, in minimum walls
+SKIRT_MM = 1.0  # beyond what stands out of the triangle; the bevels cut it away
+UPRIGHT = 1e-6  # of a unit normal: facets that lean by less are the two faces
+SAME_PLANE = 1e-7
+STEEPEST_COSINE = 0.5  # the outer face of patches that lean more lies no higher over them than at 60°
+SHARES = np.linspace(1, 0, 21)  # of a patch's height, tried from all of it to none
 
 
-def raised(prismoid: Prismoid, triangle: Floats, patch: CurvedPatch) -> Prismoid:
-    """The flat piece's bevels made steep enough for skins that rise and dip at its sides.
+def needed_lift_mm(triangle: Floats, patch: CurvedPatch, dimensions: Dimensions) -> float:
+    """How much higher than half the thickness over the patch the outer face must lie.
 
-    A bevel that serves all bends at the lowest and at the highest point of a side serves them at every height
-    between. From t/2 to h a joint that cuts away asks for d·h/(t/2), one that adds for no more than d.
+    Every pocket then keeps its roof, and the piece is a plate `LEAST_PLATE_WALLS` thick at least.
     """
-    half, insets = prismoid.thickness_mm / 2, prismoid.insets(triangle)
-    shares = np.linspace(0, 1, FOOTPRINT_POINTS)
-    reach = np.empty((2, 3))
-    for side, inward in enumerate(inward_normals(triangle)):
-        line = triangle[side] + shares[:, None] * (triangle[(side + 1) % 3] - triangle[side])
-        heights = np.stack(
-            [patch.points(_barycentric(triangle, line + at * inward))[:, 2] for at in (0.0, *insets[:, side])]
-        )
-        reach[:, side] = half - min(float(heights.min()), 0.0), half + max(float(heights.max()), 0.0)
-    wanted = np.where(insets > 0, insets * reach / half, insets)
-    slope = (wanted[1] - wanted[0]) / reach.sum(axis=0)
-    middle = wanted[0] + slope * reach[0]
-    middle += np.maximum(-middle, 0.0)
-    return bevelled(triangle, np.stack([middle - slope * half, middle + slope * half]), prismoid.thickness_mm)
+    d, half = dimensions, dimensions.thickness_mm / 2
+    inside = patch.points(barycentric_grid(3).points)[:, 2]
+    lacking = [LEAST_PLATE_WALLS * d.min_wall_mm - d.thickness_mm - float(inside.min())]
+    if d.connector != "none":
+        over = patch.points(_barycentric(triangle, _footprints(triangle, d)))[:, 2]
+        lacking.append(d.pocket_height_mm / 2 + d.min_wall_mm - half - float(over.min()))
+    return max(0.0, *lacking)
 
 
-def needed_thickness_mm(triangle: Floats, patch: CurvedPatch, dimensions: Dimensions) -> float:
-    """The thickness at which every pocket keeps its roof where the patch dips under its triangle; 0 without pockets."""
-    d = dimensions
-    if d.connector == "none":
-        return 0.0
-    wall = d.min_wall_mm
-    half = _half_housing_mm(d)
-    x = np.linspace(-half, half, FOOTPRINT_POINTS)
-    y = np.linspace(0.0, d.pocket_depth_mm + wall, FOOTPRINT_POINTS)
-    local = np.stack([*np.meshgrid(x, y), np.zeros((len(y), len(x))), np.ones((len(y), len(x)))], axis=-1)
-    points = np.einsum("sij,yxj->syxi", side_frames(triangle, dimensions.key_bend_degrees / 2), local)[..., :2].reshape(
-        -1, 2
+def _footprints(triangle: Floats, d: Dimensions) -> Floats:
+    """(n, 2): places over the pockets' roofs and the walls around them."""
+    roof = d.pocket_height_mm / 2
+    half = d.pocket_width_mm / 2 + flare_mm(d, roof) + d.min_wall_mm
+    x, y = np.meshgrid(
+        np.linspace(-half, half, FOOTPRINT_POINTS),
+        np.linspace(0.0, depth_mm(d, roof) + d.min_wall_mm, FOOTPRINT_POINTS),
     )
-    lowest = float(patch.points(_barycentric(triangle, points))[:, 2].min())
-    return d.pocket_height_mm + 2 * wall - 2 * min(lowest, 0.0)
+    local = np.stack([x, y, np.zeros_like(x), np.ones_like(x)], axis=-1)
+    frames = side_frames(triangle, d.key_bend_degrees / 2)
+    return np.einsum("sij,yxj->syxi", frames, local)[..., :2].reshape(-1, 2)
 
 
-def curved_solid(
-    triangle: Floats, patch: CurvedPatch, prismoid: Prismoid, dimensions: Dimensions, levels: int
-) -> Solid:
-    """The piece before its pockets are cut: the shell and, inside of it, what is needed around the pockets."""
-    shell = Solid.of(shell_mesh(triangle, patch, prismoid, levels))
-    if dimensions.connector == "none":
-        return shell
-    insets = prismoid.insets(triangle) + LEFT_AROUND_HOUSING_MM
-    room = bevelled(triangle, insets, dimensions.thickness_mm).solid
-    housing = _housing(dimensions)
-    for frame in side_frames(triangle, dimensions.key_bend_degrees / 2):
-        shell = shell + (housing.moved(frame) & room)
-    return shell
+def outer_margin(triangle: Floats, prismoid: Prismoid, patch: CurvedPatch, lift_mm: float, wall_mm: float) -> Margin:
+    """What the bevels leave of the outer face where its sides stand highest."""
+    sides = np.concatenate([barycentric_grid(3).points[side] for side in barycentric_grid(3).sides])
+    highest = prismoid.thickness_mm / 2 + lift_mm + max(float(patch.points(sides)[:, 2].max()), 0.0)
+    return Margin("inscribed radius of the curved face", wall_mm, inradius(triangle, prismoid.outline(highest)))
 
 
-def _housing(dimensions: Dimensions) -> Solid:
-    """The walls of a pocket down to where the inner face of a flat piece would be, in connector coordinates."""
-    d = dimensions
-    half, floor = _half_housing_mm(d), depth_mm(d, deepest_height_mm(d)) + d.min_wall_mm
-    return Solid.box((-half, -d.thickness_mm, -d.thickness_mm / 2), (half, floor, d.pocket_height_mm / 2))
+def curved_solid(triangle: Floats, patch: CurvedPatch, prismoid: Prismoid, lift_mm: float, levels: int) -> Solid:
+    """The piece before its pockets are cut: what is under the outer face, cut by the flat piece's planes."""
+    normals, offsets = _side_planes(prismoid)
+    half = prismoid.thickness_mm / 2
+    top = half + lift_mm + max(float(patch.points(barycentric_grid(levels).points)[:, 2].max()), 0.0)
+    outline = np.concatenate([prismoid.outline(height) for height in (-half, 0.0, half, top)])
+    out = max(-float(((outline[:, None] - triangle) * inward_normals(triangle)).sum(axis=2).min()), 0.0)
+    solid = Solid.of(block_mesh(triangle, patch, (-half, half + lift_mm), out + SKIRT_MM, levels))
+    for normal, offset in zip(normals, offsets, strict=True):
+        solid = solid.beyond(-normal, float(offset))
+    return solid
 
 
-def _half_housing_mm(d: Dimensions) -> float:
-    """Half the width of a housing: a wall behind the grooves, where the pocket is widest."""
-    return d.pocket_width_mm / 2 + flare_mm(d, -d.thickness_mm / 2) + d.detent_mm + d.min_wall_mm
+def _side_planes(prismoid: Prismoid) -> tuple[Floats, Floats]:
+    """Outward normals (n, 3) and offsets (n,): the planes normal·p + offset = 0 of all but the two faces."""
+    equations = np.asarray(ConvexHull(prismoid.points).equations, np.float64)
+    equations = equations[np.abs(equations[:, 2]) < 1 - UPRIGHT]
+    apart = np.abs(equations[:, None] - equations[None]).max(axis=2) > SAME_PLANE
+    first = [i for i in range(len(equations)) if apart[i, :i].all()]
+    return equations[first, :3], equations[first, 3]
 
 
-def shell_mesh(triangle: Floats, patch: CurvedPatch, prismoid: Prismoid, levels: int) -> TriMesh:
-    """The two skins, each half the thickness along the patch's normal from it, joined by quad strips in the bevels."""
-    grid = barycentric_grid(levels)
-    planes = _bevel_planes(triangle, prismoid)
-    skins = [_skin(triangle, patch, planes, height, levels) for height in prismoid.heights_mm]
-    count = len(grid.points)
-    faces = [grid.faces[:, ::-1], grid.faces + count]
-    for side in grid.sides:
-        a, b = side[:-1], side[1:]
-        faces += [np.stack([a, b, b + count], axis=1), np.stack([a, b + count, a + count], axis=1)]
-    return TriMesh(np.vstack(skins), np.vstack(faces))
+def block_mesh(
+    triangle: Floats, patch: CurvedPatch, heights_mm: tuple[float, float], skirt_mm: float, levels: int
+) -> TriMesh:
+    """What lies between z = `heights_mm[0]` and the surface at the other height over the patch.
+
+    The patch goes on over its sides by a skirt, along its tangents. Heights are measured upright and made up for the
+    slope: a surface that bends more than its thickness allows does not fold.
+    """
+    grid, ring = barycentric_grid(levels), _ring(levels)
+    inradius_mm = float((inward_normals(triangle)[0] * (_incentre(triangle) - triangle[0])).sum())
+    incentre = _barycentric(triangle, _incentre(triangle)[None])
+    border = grid.points[ring]
+    tangent = np.einsum("ntj,tk->njk", gradients(patch.exponents, border), patch.coefficients)
+    skirt = patch.points(border) + np.einsum("nj,njk->nk", skirt_mm / inradius_mm * (border - incentre), tangent)
+    points = np.vstack([patch.points(grid.points), skirt])
+    rise = np.maximum(patch.normals(np.vstack([grid.points, border]))[:, 2], STEEPEST_COSINE)
+    upper = points + np.column_stack([np.zeros((len(points), 2)), heights_mm[1] / rise])
+    lower = np.column_stack([points[:, :2], np.full(len(points), heights_mm[0])])
+    count, outside = len(points), len(grid.points) + np.arange(len(ring))
+    ahead, after = np.roll(ring, -1), np.roll(outside, -1)
+    face = np.vstack([
+        grid.faces, np.stack([ahead, ring, outside], axis=1), np.stack([ahead, outside, after], axis=1)
+    ])  # fmt: skip
+    walls = [
+        np.stack([outside, after, after + count], axis=1), np.stack([outside, after + count, outside + count], axis=1)
+    ]  # fmt: skip
+    return TriMesh(np.vstack([lower, upper]), np.vstack([face[:, ::-1], face + count, *walls]))
 
 
-def _bevel_planes(triangle: Floats, prismoid: Prismoid) -> tuple[Floats, Floats]:
-    """Normals (3, 3) and levels (3,): side i's bevel is where normal·p = level."""
-    inward = inward_normals(triangle)
-    inner, outer = prismoid.insets(triangle)
-    slope = (outer - inner) / prismoid.thickness_mm
-    level = np.einsum("sk,sk->s", inward, triangle) + (inner + outer) / 2
-    return np.column_stack([inward, -slope]), level
+def _ring(levels: int) -> Ints:
+    """Numbers of the grid's points round its border, counter-clockwise."""
+    return np.concatenate([side[:-1] for side in barycentric_grid(levels).sides])
 
 
-def _skin(triangle: Floats, patch: CurvedPatch, planes: tuple[Floats, Floats], height_mm: float, levels: int) -> Floats:
-    """(n, 3): the grid on the surface at a height over the patch, its sides in the planes of the bevels."""
-    grid, inward = barycentric_grid(levels), inward_normals(triangle)
-
-    def at(plan: Floats) -> Floats:
-        b = _barycentric(triangle, plan)
-        return patch.points(b) + height_mm * patch.normals(b)
-
-    def beyond(plan: Floats, side: int) -> Floats:
-        return at(plan) @ planes[0][side] - planes[1][side]
-
-    corners = np.stack([_corner(triangle, beyond, i) for i in range(3)])
-    plan = grid.points @ corners
-    for side in range(3):
-        shares = np.linspace(0, 1, 2**levels + 1)
-        line = corners[side] + shares[:, None] * (corners[(side + 1) % 3] - corners[side])
-        depth = np.zeros(len(shares))
-        for _ in range(NEWTON_STEPS):
-            value = beyond(line + depth[:, None] * inward[side], side)
-            ahead = beyond(line + (depth + STEP_MM)[:, None] * inward[side], side)
-            depth -= value * STEP_MM / (ahead - value)
-        a, b, c = grid.points[:, side], grid.points[:, (side + 1) % 3], grid.points[:, (side + 2) % 3]
-        along = np.divide(b, a + b, out=np.zeros_like(b), where=a + b > 0)
-        plan = plan + ((1 - c) * np.interp(along, shares, depth))[:, None] * inward[side]
-    return at(plan)
-
-
-def _corner(triangle: Floats, beyond: Callable[[Floats, int], Floats], corner: int) -> Floats:
-    """(2,): where in plan the bevels of the two sides at a corner meet on a skin, by Newton's method."""
-    sides = ((corner - 1) % 3, corner)
-    plan = triangle[corner][None].copy()
-    for _ in range(NEWTON_STEPS):
-        steps = plan + STEP_MM * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-        values = np.stack([beyond(steps, s) for s in sides])
-        jacobian = (values[:, 1:] - values[:, :1]) / STEP_MM
-        plan = plan - np.linalg.solve(jacobian, values[:, 0])
-    return plan[0]
+def _incentre(triangle: Floats) -> Floats:
+    opposite = np.linalg.norm(np.roll(triangle, -1, axis=0) - np.roll(triangle, 1, axis=0), axis=1)
+    return opposite @ triangle / opposite.sum()
 
 
 def _barycentric(triangle: Floats, points: Floats) -> Floats:

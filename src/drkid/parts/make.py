@@ -1,5 +1,6 @@
 """The one function of this stage."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import count
@@ -15,7 +16,7 @@ from drkid.mesh import Floats, Ints, read_only
 from drkid.parts.bevel import require_bends
 from drkid.parts.bevel_variants import Moulds, moulds
 from drkid.parts.coupon import coupon
-from drkid.parts.curved_piece import curved_solid, needed_thickness_mm, raised
+from drkid.parts.curved_piece import SHARES, curved_solid, needed_lift_mm, outer_margin
 from drkid.parts.dimensions import THICKNESS_STEP_MM, proposals
 from drkid.parts.fit import FITS_MM, Margin, corner_room_mm, margins, smallest_scale
 from drkid.parts.groove import groove_mm
@@ -38,11 +39,11 @@ from drkid.spec import FOLLOWING, KitSpec
 MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 FIRST_GUESS_THICKNESSES = 4.0  # mean edge of the pieces with which the search for a size begins
 WHOLE_MM = 1e-6
+MOST_DEEPENINGS = 60  # each may need a larger size; two or three do, unless joints are very sharp
+MOST_BEVEL_OF_REACH = 0.5  # of a connector's reach: what the bevels of merged pieces may leave without walls
 MOST_OF_SIDE = 0.4  # of the shortest side: how wide a pocket may be that is proposed for its strength
 ROUNDING_ROOM = 1.005  # lengths rounded up to tenths of a mm make triangles of a slightly other shape
 SMALLER = 1 - 1e-4  # of a scale: what another connector must save to be taken
-MOST_THICKENINGS = 60  # each may need a larger size; two or three do, unless joints are very sharp
-MOST_BEVEL_OF_REACH = 0.5  # of a connector's reach: what the bevels of curved pieces may leave without walls
 
 
 def make_parts(
@@ -54,8 +55,9 @@ def make_parts(
     `spec.bevel_variants` of each. An equilateral piece is laid down in the way that narrows its bevels.
     The scale is the decomposition's own where given edge lengths fix it. Else it makes the longest side of the mesh's
     bounding box `spec.size_mm`, or is the smallest at which all pockets and walls fit, rounded up to whole mm of that
-    side. The inner face of each is marked, if it is flat. With curved `patches` the decomposition is theirs, and pieces
-    are as thick as the patches need; with merged ones it is that of the triangles.
+    side. The inner face of each is marked, if it is flat. With curved `patches` the decomposition is theirs, and the
+    size that of flat pieces: patches are flattened where their outer faces find no room at it. With merged ones it is
+    that of the triangles.
 
     Raises:
         FitError: pockets and walls do not fit at the asked size or thickness, a piece is larger than the bed, or a
@@ -69,11 +71,12 @@ def make_parts(
     progress("finding the size", 0.2)
     curved = tuple(patches.curved[k] for k in found.class_index) if patches and patches.curved else ()
     merged = patches if patches and patches.merged else None
-    design = _chosen([_Design(found, d, spec, curved, merged) for d in proposals(spec, sharpest)])
+    design = _chosen([_Design(found, d, spec, curved, curved, merged) for d in proposals(spec, sharpest)])
     design, scale = _scaled(design)
     require_bends(decomposition.mesh.scaled(scale), spec)
+    design = design.flattened(scale)
     progress("cutting parts", 0.5)
-    corners = _truncated(design, scale) if patches is None else Truncated(design.pieces(scale))
+    corners = _truncated(design, scale) if merged is None else Truncated(design.pieces(scale))
     shapes = corners.shapes
     recess = recesses_of(found, shapes, scale)
     width = groove_mm(decomposition.mesh, members, recess)
@@ -91,6 +94,7 @@ def make_parts(
             *notes(found, design.dimensions, spec, recess, scale),
             *groove_notes(width, choices, spec),
             *corner_notes(corners),
+            *design.curved_notes(scale),
         ),
         findings=findings(
             design.triangles(scale), shapes, np.unique(members.face_class).tolist(), found, design.dimensions, spec
@@ -100,6 +104,7 @@ def make_parts(
         cut_corners=corners.corners,
         deepest_cut_mm=corners.deepest_mm,
         split_class=tuple(found.class_index.tolist()) if found.variant.any() else (),
+        patch_share=design.patch_share,
     )
     if merged is not None:
         part_set = merged_parts(merged, part_set, spec, tuple(connector_notes(members, design.dimensions)))
@@ -114,13 +119,15 @@ def make_parts(
 
 @dataclass(frozen=True, eq=False)
 class _Design:
-    """All but the scale."""
+    """All but the scale; `curved` are the `given` patches with `patch_share` of their height."""
 
     moulds: Moulds
     dimensions: Dimensions
     spec: KitSpec
     curved: tuple[CurvedPatch, ...] = ()
+    given: tuple[CurvedPatch, ...] = ()
     merged: Patches | None = None
+    patch_share: float = 1.0
 
     @property
     def decomposition(self) -> Decomposition:
@@ -145,28 +152,55 @@ class _Design:
         return laid_down(printed_lengths(self.decomposition.class_lengths, scale))
 
     def pieces(self, scale: float) -> tuple[Prismoid, ...]:
-        flat = thickened(self.decomposition.class_lengths, self.members, self.dimensions, self.spec, scale)
-        if not self.curved:
-            return flat
-        zipped = zip(flat, self.triangles(scale), self.curved, strict=True)
-        return tuple(raised(piece, triangle, patch.scaled(scale)) for piece, triangle, patch in zipped)
+        return thickened(self.decomposition.class_lengths, self.members, self.dimensions, self.spec, scale)
 
-    def needed_thickness_mm(self, scale: float) -> float:
-        """What the curved patches ask for; 0 where pieces are flat."""
+    def lift_mm(self, scale: float) -> float:
+        """How much higher than half the thickness over their patches the outer faces of all curved pieces lie."""
         zipped = zip(self.triangles(scale), self.curved, strict=False)
-        return max((needed_thickness_mm(t, p.scaled(scale), self.dimensions) for t, p in zipped), default=0.0)
+        return max((needed_lift_mm(t, p.scaled(scale), self.dimensions) for t, p in zipped), default=0.0)
+
+    def curved_margins(self, scale: float) -> list[Margin]:
+        """Of every mould's outer face; none where pieces are flat."""
+        lift, wall = self.lift_mm(scale), self.dimensions.min_wall_mm
+        zipped = zip(self.triangles(scale), self.pieces(scale), self.curved, strict=True) if self.curved else ()
+        return [outer_margin(t, piece, patch.scaled(scale), lift, wall) for t, piece, patch in zipped]
+
+    def flattened(self, scale: float) -> "_Design":
+        """With as much of the patches' height, the same share of all, as leaves every outer face its room."""
+        tried = self
+        for share in SHARES.tolist() if self.curved else ():
+            tried = replace(self, curved=tuple(p.flattened(share) for p in self.given), patch_share=share)
+            if all(margin.slack_mm >= FITS_MM for margin in tried.curved_margins(scale)):
+                break
+        return tried
+
+    def curved_notes(self, scale: float) -> Iterator[str]:
+        """What the outer faces of curved pieces are like that a user might not expect."""
+        if not self.curved:
+            return
+        lift = self.lift_mm(scale)
+        if lift:
+            yield (
+                f"Patches dip under their triangles: all outer faces lie {lift:.1f} mm higher over them than half the "
+                "thickness, for the pockets' roofs."
+            )
+        if self.patch_share < 1:
+            whole = replace(self, curved=self.given)
+            index, margin = min(enumerate(whole.curved_margins(scale)), key=lambda pair: pair[1].slack_mm)
+            yield (
+                f"Patches have {100 * self.patch_share:.0f} % of their height: with all of it the {margin.what} of "
+                f"class {self.moulds.name(index)} would be {margin.available_mm:.2f} mm, {margin.needed_mm:g} mm are "
+                "needed behind the bevels of its sharpest joints; more --faces or a larger --size-mm leave more."
+            )
 
     def needed_depth_mm(self, scale: float) -> float:
-        """How deep pockets of curved and merged pieces are, so that their own bevels leave the hold.
+        """How deep pockets of merged pieces are, so that their own bevels leave the hold.
 
-        0 where pieces are flat triangles or have no pockets.
+        0 where pieces are triangles or have no pockets.
         """
-        if not (self.curved or self.merged) or self.dimensions.connector == "none":
+        if self.merged is None or self.dimensions.connector == "none":
             return 0.0
-        if self.merged is not None:
-            insets = merged_insets(self.merged, scale, self.dimensions, self.spec)
-        else:
-            insets = [p.insets(t) for p, t in zip(self.pieces(scale), self.triangles(scale), strict=True)]
+        insets = merged_insets(self.merged, scale, self.dimensions, self.spec)
         deepest = max(float(inset.max()) for inset in insets)
         return deepest / MOST_BEVEL_OF_REACH + 2 * self.dimensions.clearance_mm
 
@@ -217,37 +251,24 @@ def _chosen(designs: list[_Design]) -> _Design:
 
 
 def _scaled(design: _Design) -> tuple[_Design, float]:
-    """The scale, and the design with pieces as thick as curved patches need at it: they dip more the larger they are.
+    """The scale, and the design with pockets as deep as the bevels of merged pieces need them at it.
 
     Raises:
-        FitError: a thickness is given that is less, or bevels so wide that no size is enough.
+        FitError: bevels are so wide that no size is enough.
     """
-    for _ in range(MOST_THICKENINGS):
+    for _ in range(MOST_DEEPENINGS):
         scale, dimensions = _scale(design), design.dimensions
-        thickness, depth = _stepped(design.needed_thickness_mm(scale)), _stepped(design.needed_depth_mm(scale))
-        if max(thickness - dimensions.thickness_mm, depth - dimensions.pocket_depth_mm) <= WHOLE_MM:
+        depth = round(ceil(design.needed_depth_mm(scale) / THICKNESS_STEP_MM - WHOLE_MM) * THICKNESS_STEP_MM, 6)
+        if depth - dimensions.pocket_depth_mm <= WHOLE_MM:
             return design, scale
-        if thickness > dimensions.thickness_mm and design.spec.thickness_mm is not None:
-            raise FitError(
-                "the curved patches dip so far under their triangles that the pockets would lose their roof",
-                wanted=f"thickness_mm of {thickness:.2f} at least",
-                found=f"{dimensions.thickness_mm:g}",
-                remedy="thicker pieces (--thickness-mm), fewer --curved-classes, or --patch flat",
-            )
-        thickness, depth = max(thickness, dimensions.thickness_mm), max(depth, dimensions.pocket_depth_mm)
-        design = replace(design, dimensions=replace(dimensions, thickness_mm=thickness, pocket_depth_mm=depth))
+        design = replace(design, dimensions=replace(dimensions, pocket_depth_mm=depth))
     dimensions, sharpest = design.dimensions, np.degrees(np.abs(design.members.bend_radians).max())
     raise FitError(
-        "no size is found at which the bevels of curved or merged pieces leave enough of their pockets",
+        "no size is found at which the bevels of merged pieces leave enough of their pockets",
         wanted=f"pockets {dimensions.pocket_depth_mm:g} mm deep in pieces {dimensions.thickness_mm:g} mm thick",
         found=f"joints that bend by up to {sharpest:.0f}°",
-        remedy="more pieces (--faces), a given --size-mm, or --patch flat",
+        remedy="more pieces (--faces), a given --size-mm, or no --merge",
     )
-
-
-def _stepped(length_mm: float) -> float:
-    """Rounded up to the steps in which thicknesses are proposed."""
-    return round(ceil(length_mm / THICKNESS_STEP_MM - WHOLE_MM) * THICKNESS_STEP_MM, 6)
 
 
 def _scale(design: _Design) -> float:
@@ -323,7 +344,7 @@ def _right_part(design: _Design, index: int, shape: Prismoid, scale: float) -> P
     solid = shape.solid
     if design.curved:
         patch, levels = design.curved[index].scaled(scale), design.spec.subdivision_levels
-        solid = curved_solid(triangle, patch, shape, design.dimensions, levels)
+        solid = curved_solid(triangle, patch, shape, design.lift_mm(scale), levels)
     if design.dimensions.connector != "none":
         solid = solid.minus_all([pocket(design.dimensions).moved(frame) for frame in frames])
     symmetric = is_mirror_symmetric(design.decomposition.class_lengths[index])
@@ -343,9 +364,8 @@ def _marked(part_set: PartSet, spec: KitSpec) -> PartSet:
     depth = spec.preset.mark_depth_mm if spec.mark_depth_mm is None else spec.mark_depth_mm
     if not spec.marks or depth == 0:
         return part_set
-    if spec.patch == "curved" or part_set.merged:
-        kind = "Curved" if spec.patch == "curved" else "Merged"
-        note = f"{kind} pieces have no one plane inside, and bear no marks."
+    if part_set.merged:
+        note = "Merged pieces have no one plane inside, and bear no marks."
         findings_ = tuple(finding for finding in part_set.findings if finding.subject != "marks")
         return replace(part_set, notes=(*part_set.notes, note), findings=findings_)
     made, notes_ = list[Part](), list[str]()

@@ -1,5 +1,7 @@
 """Curved patches for every class, in the way that is asked for, and what they bring."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from drkid.curved_patch import CurvedPatch
@@ -7,7 +9,7 @@ from drkid.kit import CurvedFigures, Decomposition, Patches
 from drkid.measure import bend_radians
 from drkid.mesh import TriMesh
 from drkid.patches.depth_classes import with_depths
-from drkid.patches.laid_faces import LaidFaces
+from drkid.patches.laid_faces import LaidFaces, laid_faces
 from drkid.patches.published_patch import curvature_space, published_patches
 from drkid.patches.smoothness import assembled, joints
 from drkid.spec import KitSpec
@@ -34,6 +36,22 @@ def curved_patches(decomposition: Decomposition, surface: TriMesh, spec: KitSpec
         threshold = _threshold_percent(laid, shapes, spec.subdivision_levels)
     figures = _figures(decomposition, laid, shapes, threshold, spec.subdivision_levels)
     return Patches(divided, shapes, figures, allowance=allowance)
+
+
+def flattened_patches(patches: Patches, share: float, levels: int) -> Patches:
+    """The patches with so much of their height, and what they then bring; nothing changes where all of it is left."""
+    if share >= 1 or patches.figures is None:
+        return patches
+    laid, shapes = laid_faces(patches.decomposition), tuple(p.flattened(share) for p in patches.curved)
+    found = joints(laid, shapes)
+    figures = replace(
+        patches.figures,
+        gap=found.gap,
+        break_mean=float(found.break_degrees.mean()),
+        break_p95=float(np.percentile(found.break_degrees, PERCENTILE)),
+        surface=assembled(laid, shapes, levels),
+    )
+    return replace(patches, curved=shapes, figures=figures)
 
 
 def most_gap(decomposition: Decomposition, spec: KitSpec) -> float:
