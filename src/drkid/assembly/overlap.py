@@ -150,7 +150,8 @@ class _Body:
         hull = Solid.hull(solid.mesh().vertices)
         mesh = hull.mesh()
         normals = mesh.face_normals[mesh.areas > 0]
-        planes = np.column_stack([normals, np.einsum("ij,ij->i", normals, mesh.corners[mesh.areas > 0, 0])])
+        levels = (normals @ mesh.vertices.T).max(axis=1)  # a sliver's own may lie inside: its normal is mostly rounding
+        planes = np.column_stack([normals, levels])
         return cls(solid, hull, mesh.vertices, np.unique(np.round(planes, 9), axis=0))
 
 

@@ -18,6 +18,7 @@ from drkid.mesh import Floats
 from drkid.solid import Solid
 
 TOUCHING_DEGREES = 0.5  # less than the swing that bevels leave room for: there they touch
+TIP = 0.1  # of a side at either end, where a merged piece's swing is not told by sectors
 SAME_BEND = 1e-6  # radians: bends that differ by less are equal, so that rounding does not choose
 
 
@@ -28,6 +29,17 @@ class Shape:
     corners: Floats
     side_frames: Floats
     solid: Solid
+
+    def beside(self, side: int) -> Solid:
+        """What of the part lies beside a side: all of a triangle, less of a piece that is merged.
+
+        Its other triangles may lie across the axis beyond the side's ends: `overlapping` looks at those.
+        """
+        if len(self.corners) == 3:
+            return self.solid
+        a, b = self.corners[[side, (side + 1) % len(self.corners)]]
+        ends, along = np.array([[1 - TIP, TIP], [TIP, 1 - TIP]]) @ np.stack([a, b]), b - a
+        return self.solid.beyond(along, float(along @ ends[0])).beyond(-along, -float(along @ ends[1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +86,9 @@ class Structure:
     def swinging(self, wanted_degrees: float) -> Swing:
         """How far the hinges turn."""
         reach = [
-            np.array([sectors(shape.solid.mesh().vertices, frame) for frame in shape.side_frames])
+            np.array([sectors(shape.beside(side).mesh().vertices, shape.side_frames[side]) for side in range(count)])
             for shape in self.shapes
+            for count in (len(shape.corners),)
         ]
         return swing(self.framework, self.parts, self.graph.sides, reach, wanted_degrees)[0]
 

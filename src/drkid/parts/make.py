@@ -17,13 +17,13 @@ from drkid.parts.bevel import require_bends
 from drkid.parts.bevel_variants import Moulds, moulds
 from drkid.parts.coupon import coupon
 from drkid.parts.curved_piece import SHARES, curved_solid, needed_lift_mm, outer_margin
-from drkid.parts.dimensions import THICKNESS_STEP_MM, proposals
+from drkid.parts.dimensions import proposals
 from drkid.parts.fit import FITS_MM, Margin, corner_room_mm, margins, smallest_scale
 from drkid.parts.groove import groove_mm
 from drkid.parts.groove_choices import groove_choices, recesses_of
 from drkid.parts.hinge import hinge_half
 from drkid.parts.key import box_key
-from drkid.parts.make_merged import merged_insets, merged_parts
+from drkid.parts.make_merged import merged_parts
 from drkid.parts.marks import marked
 from drkid.parts.members import Members
 from drkid.parts.notes import connector_notes, corner_notes, groove_notes, notes
@@ -39,8 +39,6 @@ from drkid.spec import FOLLOWING, KitSpec
 MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 FIRST_GUESS_THICKNESSES = 4.0  # mean edge of the pieces with which the search for a size begins
 WHOLE_MM = 1e-6
-MOST_DEEPENINGS = 60  # each may need a larger size; two or three do, unless joints are very sharp
-MOST_BEVEL_OF_REACH = 0.5  # of a connector's reach: what the bevels of merged pieces may leave without walls
 MOST_OF_SIDE = 0.4  # of the shortest side: how wide a pocket may be that is proposed for its strength
 ROUNDING_ROOM = 1.005  # lengths rounded up to tenths of a mm make triangles of a slightly other shape
 SMALLER = 1 - 1e-4  # of a scale: what another connector must save to be taken
@@ -71,8 +69,8 @@ def make_parts(
     progress("finding the size", 0.2)
     curved = tuple(patches.curved[k] for k in found.class_index) if patches and patches.curved else ()
     merged = patches if patches and patches.merged else None
-    design = _chosen([_Design(found, d, spec, curved, curved, merged) for d in proposals(spec, sharpest)])
-    design, scale = _scaled(design)
+    design = _chosen([_Design(found, d, spec, curved, curved) for d in proposals(spec, sharpest)])
+    scale = _scale(design)
     require_bends(decomposition.mesh.scaled(scale), spec)
     design = design.flattened(scale)
     progress("cutting parts", 0.5)
@@ -126,7 +124,6 @@ class _Design:
     spec: KitSpec
     curved: tuple[CurvedPatch, ...] = ()
     given: tuple[CurvedPatch, ...] = ()
-    merged: Patches | None = None
     patch_share: float = 1.0
 
     @property
@@ -193,17 +190,6 @@ class _Design:
                 "needed behind the bevels of its sharpest joints; more --faces or a larger --size-mm leave more."
             )
 
-    def needed_depth_mm(self, scale: float) -> float:
-        """How deep pockets of merged pieces are, so that their own bevels leave the hold.
-
-        0 where pieces are triangles or have no pockets.
-        """
-        if self.merged is None or self.dimensions.connector == "none":
-            return 0.0
-        insets = merged_insets(self.merged, scale, self.dimensions, self.spec)
-        deepest = max(float(inset.max()) for inset in insets)
-        return deepest / MOST_BEVEL_OF_REACH + 2 * self.dimensions.clearance_mm
-
     def tightest(self, scale: float) -> tuple[int, Margin]:
         """The mould with the least slack of those in use, and where."""
         used = np.unique(self.members.face_class)
@@ -248,27 +234,6 @@ def _chosen(designs: list[_Design]) -> _Design:
         if design.slack_mm(least * SMALLER) >= 0:
             best, least = design, design.smallest_scale
     return best
-
-
-def _scaled(design: _Design) -> tuple[_Design, float]:
-    """The scale, and the design with pockets as deep as the bevels of merged pieces need them at it.
-
-    Raises:
-        FitError: bevels are so wide that no size is enough.
-    """
-    for _ in range(MOST_DEEPENINGS):
-        scale, dimensions = _scale(design), design.dimensions
-        depth = round(ceil(design.needed_depth_mm(scale) / THICKNESS_STEP_MM - WHOLE_MM) * THICKNESS_STEP_MM, 6)
-        if depth - dimensions.pocket_depth_mm <= WHOLE_MM:
-            return design, scale
-        design = replace(design, dimensions=replace(dimensions, pocket_depth_mm=depth))
-    dimensions, sharpest = design.dimensions, np.degrees(np.abs(design.members.bend_radians).max())
-    raise FitError(
-        "no size is found at which the bevels of merged pieces leave enough of their pockets",
-        wanted=f"pockets {dimensions.pocket_depth_mm:g} mm deep in pieces {dimensions.thickness_mm:g} mm thick",
-        found=f"joints that bend by up to {sharpest:.0f}°",
-        remedy="more pieces (--faces), a given --size-mm, or no --merge",
-    )
 
 
 def _scale(design: _Design) -> float:

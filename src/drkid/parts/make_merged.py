@@ -7,22 +7,25 @@ import numpy as np
 
 from drkid.kit import Dimensions, Handedness, MergedClass, MergedPiece, Part, PartSet, Patches, class_id
 from drkid.measure import bend_radians
-from drkid.mesh import Floats, TriMesh, read_only
-from drkid.parts.bevel import bevel_insets, flippable_insets
-from drkid.parts.dimensions import deepest_bevel_mm
+from drkid.mesh import Bools, Floats, TriMesh, read_only
+from drkid.parts.bevel import bevel_insets, flippable_insets, limited, ridged
+from drkid.parts.dimensions import deepest_bevel_mm, held_height_mm
 from drkid.parts.merged_piece import (
     bevel_planes,
+    cutting_sides,
     demanded,
+    far_inside,
     merged_solid,
     outline_bends,
     outline_frames,
-    shared_insets,
+    shared,
 )
+from drkid.parts.merged_truncation import tips_cut
 from drkid.parts.pocket import pocket
-from drkid.spec import FOLLOWING, KitSpec
+from drkid.solid import Solid
+from drkid.spec import KitSpec
 
 THIN_OF_WALL = 0.95  # of the wanted wall: thinner ones are told
-MOST_MIDDLE_INSET = 0.45  # of the thickness: how far a side may stand back from the hinge axis at mid-height
 
 
 def merged_parts(patches: Patches, of_triangles: PartSet, spec: KitSpec, notes: tuple[str, ...] = ()) -> PartSet:
@@ -35,8 +38,19 @@ def merged_parts(patches: Patches, of_triangles: PartSet, spec: KitSpec, notes: 
     scale, dimensions = of_triangles.scale_mm_per_unit, of_triangles.dimensions
     mesh_mm = patches.decomposition.mesh.scaled(scale)
     shapes = tuple(_scaled(shape, scale) for shape in patches.merged)
-    insets = merged_insets(patches, scale, dimensions, spec)
-    parts = tuple(_part(k, shape, insets[k], dimensions) for k, shape in enumerate(shapes))
+    insets = _merged_insets(mesh_mm, patches, scale, dimensions, spec)
+    space = None if dimensions.connector == "none" else pocket(dimensions)
+    thickness, wall = dimensions.thickness_mm, dimensions.min_wall_mm
+    cutting = [cutting_sides(s, i, thickness, space, wall) for s, i in zip(shapes, insets, strict=True)]
+    bodies = tips_cut(
+        [merged_solid(s, i, thickness, c) for s, i, c in zip(shapes, insets, cutting, strict=True)],
+        [shape.corners for shape in shapes],
+        patches.pieces,
+        mesh_mm,
+        [shape.achiral for shape in shapes],
+        dimensions.clearance_mm,
+    )
+    parts = tuple(_part(k, shape, bodies[k], dimensions) for k, shape in enumerate(shapes))
     face_part = np.zeros(len(mesh_mm.faces), np.int64)
     for piece in patches.pieces:
         face_part[list(piece.faces)] = piece.class_index
@@ -46,16 +60,17 @@ def merged_parts(patches: Patches, of_triangles: PartSet, spec: KitSpec, notes: 
         face_part=read_only(face_part),
         face_turn=read_only(np.zeros(len(face_part), np.int64)),
         groove_mm=read_only(_grooves(mesh_mm, patches.pieces, insets, dimensions)),
-        notes=(*notes, *_wall_notes(shapes, insets, dimensions)),
+        notes=(*notes, *_wall_notes(list(zip(shapes, insets, cutting, bodies, strict=True)), dimensions)),
         findings=tuple(finding for finding in of_triangles.findings if not finding.subject.startswith("class ")),
         groove_choices=(),
         merged=patches.pieces,
     )
 
 
-def merged_insets(patches: Patches, scale: float, dimensions: Dimensions, spec: KitSpec) -> list[Floats]:
-    """For each shape (2, n): how far its sides stand back from their hinge axes at the inner and outer face, in mm."""
-    mesh_mm = patches.decomposition.mesh.scaled(scale)
+def _merged_insets(
+    mesh_mm: TriMesh, patches: Patches, scale: float, dimensions: Dimensions, spec: KitSpec
+) -> list[Floats]:
+    """For each shape (m, n): how far its sides stand back from their hinge axes, from inner to outer face, in mm."""
     members: list[list[MergedPiece]] = [[] for _ in patches.merged]
     for piece in patches.pieces:
         members[piece.class_index].append(piece)
@@ -63,8 +78,8 @@ def merged_insets(patches: Patches, scale: float, dimensions: Dimensions, spec: 
     return [_insets(mesh_mm, _scaled(shape, scale), own, dimensions, spec) for shape, own in zipped]
 
 
-def _wall_notes(shapes: tuple[MergedClass, ...], insets: list[Floats], dimensions: Dimensions) -> list[str]:
-    walls = [_wall_mm(shape, inset, dimensions) for shape, inset in zip(shapes, insets, strict=True)]
+def _wall_notes(rows: list[tuple[MergedClass, Floats, Bools, Solid]], dimensions: Dimensions) -> list[str]:
+    walls = [_wall_mm(*row, dimensions) for row in rows]
     thin = [class_id(k) for k, wall in enumerate(walls) if wall < THIN_OF_WALL * dimensions.min_wall_mm]
     if not thin:
         return []
@@ -74,21 +89,20 @@ def _wall_notes(shapes: tuple[MergedClass, ...], insets: list[Floats], dimension
     ]
 
 
-def _wall_mm(shape: MergedClass, insets: Floats, dimensions: Dimensions) -> float:
+def _wall_mm(shape: MergedClass, insets: Floats, cutting: Bools, body: Solid, dimensions: Dimensions) -> float:
     """The thinnest wall between two pockets, or a pocket and another side's bevel; `min_wall_mm` where it is more."""
     thinnest = dimensions.min_wall_mm
     if dimensions.connector == "none":
         return thinnest
-    body = merged_solid(shape, insets, dimensions.thickness_mm)
     frames = outline_frames(shape, dimensions.key_bend_degrees / 2)
     pockets = [body & pocket(dimensions).moved(frame) for frame in frames]
     between = [one.gap(other, thinnest) for one, other in combinations(pockets, 2)]
-    normals, levels = bevel_planes(shape, insets, dimensions.thickness_mm)
-    behind = [
-        float((one.mesh().vertices @ np.delete(normals, i, axis=0).T - np.delete(levels, i)).min())
-        for i, one in enumerate(pockets)
-    ]
-    return min(thinnest, *between, *behind)
+    normals, levels, sides = bevel_planes(shape, insets, dimensions.thickness_mm)
+    for i, one in enumerate(pockets):
+        others = cutting[shape.side_face[i]][sides] & (sides != i)
+        behind = one.mesh().vertices @ normals[others].T - levels[others]
+        thinnest = min(thinnest, float(behind.min(initial=thinnest)))
+    return min(thinnest, *between)
 
 
 def _scaled(shape: MergedClass, scale: float) -> MergedClass:
@@ -98,34 +112,32 @@ def _scaled(shape: MergedClass, scale: float) -> MergedClass:
 def _insets(
     mesh_mm: TriMesh, shape: MergedClass, members: list[MergedPiece], dimensions: Dimensions, spec: KitSpec
 ) -> Floats:
-    """(2, n): by the rule that is asked for; bent pieces have no one normal, so mean_normal is the mean bevel."""
+    """(m, n): by the rule that is asked for; bent pieces have no one normal, so mean_normal is the mean bevel."""
     thickness, sides = dimensions.thickness_mm, len(shape.corners)
+    if spec.thickening == "mean_normal":
+        return np.mean([demanded(mesh_mm, shape, p, thickness, 0.0) for p in members], axis=0)
+    if spec.thickening == "perpendicular":
+        return np.zeros((2, sides))
+    ridge = np.full(sides, dimensions.clearance_mm / 2)
     if spec.bevel_degrees is not None:
         insets = np.repeat(bevel_insets(spec.bevel_degrees, thickness, spec.swing_degrees), sides, axis=1)
-    elif spec.thickening in FOLLOWING:
-        insets = shared_insets([demanded(mesh_mm, shape, p, thickness, spec.swing_degrees) for p in members], shape)
-    elif spec.thickening == "mean_normal":
-        insets = np.mean([demanded(mesh_mm, shape, p, thickness, 0.0) for p in members], axis=0)
     else:
-        insets = np.zeros((2, sides))
+        insets = shared([demanded(mesh_mm, shape, p, thickness, spec.swing_degrees) for p in members], shape)
+        insets = insets + np.maximum(-insets.mean(axis=0, keepdims=True), 0.0)
+        ridge = ridge + shared([far_inside(mesh_mm, shape, p) for p in members], shape)
     if spec.thickening == "flippable":
         insets = flippable_insets(insets)
-    return _held(insets, dimensions)
-
-
-def _held(insets_mm: Floats, dimensions: Dimensions) -> Floats:
-    """Insets (2, n) of bevels of one plane cut down to what leaves the connector its hold, at the faces and amid."""
-    insets = np.minimum(insets_mm, deepest_bevel_mm(dimensions))
-    excess = insets.mean(axis=0, keepdims=True) - MOST_MIDDLE_INSET * dimensions.thickness_mm
-    return insets - np.maximum(excess, 0.0)
-
-
-def _part(index: int, shape: MergedClass, insets_mm: Floats, dimensions: Dimensions) -> Part:
-    frames = outline_frames(shape, dimensions.key_bend_degrees / 2)
-    solid = merged_solid(shape, insets_mm, dimensions.thickness_mm)
     if dimensions.connector != "none":
-        solid = solid.minus_all([pocket(dimensions).moved(frame) for frame in frames])
-    return Part(index, _handedness(shape), shape.corners, frames, solid)
+        share = 2 * held_height_mm(dimensions) / thickness
+        insets = limited(insets[None], ridge[None], deepest_bevel_mm(dimensions), share)[0]
+    return ridged(insets, ridge)
+
+
+def _part(index: int, shape: MergedClass, body: Solid, dimensions: Dimensions) -> Part:
+    frames = outline_frames(shape, dimensions.key_bend_degrees / 2)
+    if dimensions.connector != "none":
+        body = body.minus_all([pocket(dimensions).moved(frame) for frame in frames])
+    return Part(index, _handedness(shape), shape.corners, frames, body)
 
 
 def _handedness(shape: MergedClass) -> Handedness:
@@ -143,7 +155,7 @@ def _grooves(mesh_mm: TriMesh, pieces: tuple[MergedPiece, ...], insets: list[Flo
     outer = np.zeros(len(mesh_mm.edges), np.bool_)
     for piece in pieces:
         bend, edges = outline_bends(mesh_mm, piece)
-        recess = insets[piece.class_index] + np.array([[-half], [half]]) * np.tan(bend / 2)
+        recess = insets[piece.class_index][[0, -1]] + np.array([[-half], [half]]) * np.tan(bend / 2)
         for height in range(2):
             np.add.at(total[height], edges, recess[height])
         outer[edges] = True

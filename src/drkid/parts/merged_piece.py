@@ -6,13 +6,14 @@ import numpy as np
 
 from drkid.kit import MergedClass, MergedPiece
 from drkid.measure import bend_radians
-from drkid.mesh import Floats, Ints, TriMesh, read_only
+from drkid.mesh import Bools, Floats, Ints, TriMesh, read_only
 from drkid.parts.bevel import SHARPEST_JOINT_DEGREES
 from drkid.parts.pocket import leaning_turn
 from drkid.rigid_fit import rigid_fit
 from drkid.solid import Solid
 
 SKIRT_MM = 1.0  # beyond what stands out of the outline; the bevels cut it away
+OVERLAP_MM = 1e-3  # beyond its folds: how far the bevels of a triangle cut, so that no film is left between two cuts
 MITRE = 1e-3  # singular values below this share are left out: triangles in one plane have one normal
 
 
@@ -47,46 +48,119 @@ def demanded(
     swing, most = np.radians(swing_degrees), np.radians(SHARPEST_JOINT_DEGREES)
     bend, _ = outline_bends(mesh_mm, piece)
     low, high = (np.tan(np.clip(bend + s, -most, most) / 2) for s in (-swing, swing))
+    return far_inside(mesh_mm, shape, piece) + thickness_mm / 2 * np.stack([high, -low])
+
+
+def far_inside(mesh_mm: TriMesh, shape: MergedClass, piece: MergedPiece) -> Floats:
+    """(n,): how far the mesh's edge lies inside each side of the shape, at its farther end."""
     corners = mesh_mm.vertices[list(piece.vertices)]
     motion = rigid_fit(corners, shape.corners)
     corners = corners @ motion[:3, :3].T + motion[:3, 3]
     inward = outline_frames(shape)[:, :3, 1]
     ends = np.stack([corners - shape.corners, np.roll(corners - shape.corners, -1, axis=0)])
-    far = np.einsum("esk,sk->es", ends, inward).max(axis=0)
-    return far + thickness_mm / 2 * np.stack([high, -low])
+    return np.einsum("esk,sk->es", ends, inward).max(axis=0)
 
 
-def shared_insets(demands: list[Floats], shape: MergedClass) -> Floats:
-    """(2, n): insets that serve all members, the same on sides that are mirror images, none over the hinge axis."""
-    insets = np.max(demands, axis=0)
+def shared(lengths: list[Floats], shape: MergedClass) -> Floats:
+    """(…, n): the largest of all members' lengths, the same on sides that are mirror images."""
+    most = np.max(lengths, axis=0)
     if shape.mirror:
         n = len(shape.mirror)
         image = [shape.mirror[(i + 1) % n] for i in range(n)]  # side i runs backwards to the image of its end
-        insets = np.maximum(insets, insets[:, image])
-    return insets + np.maximum(-insets.mean(axis=0, keepdims=True), 0.0)
+        most = np.maximum(most, most[..., image])
+    return most
 
 
-def merged_solid(shape: MergedClass, insets_mm: Floats, thickness_mm: float) -> Solid:
+def merged_solid(shape: MergedClass, insets_mm: Floats, thickness_mm: float, cutting: Bools | None = None) -> Solid:
     """The piece before its pockets are cut: its triangles thick and mitred at their folds, cut by its sides' bevels.
 
-    `insets_mm` (2, n) are those of the sides at the inner and the outer face. A bevel's plane cuts the whole piece,
-    which is what a convex outline allows.
+    `insets_mm` (m, n) are those of the sides at even steps from the inner to the outer face. The planes of a side's
+    bevel cut those triangles that `cutting` (f, n) says, all of them if it is not given: that is what a convex outline
+    allows.
     """
     skirt = max(-float(insets_mm.min()), 0.0) + SKIRT_MM
     solid = Solid.of(slab_mesh(shape, skirt, thickness_mm))
-    for normal, level in zip(*bevel_planes(shape, insets_mm, thickness_mm), strict=True):
-        solid = solid.beyond(normal, float(level))
-    return solid
+    normals, levels, sides = bevel_planes(shape, insets_mm, thickness_mm)
+    cutting = np.ones((len(shape.faces), len(shape.corners)), np.bool_) if cutting is None else cutting
+    whole: Bools = np.all(cutting, axis=0)
+    for k in np.flatnonzero(whole[sides]).tolist():
+        solid = solid.beyond(normals[k], float(levels[k]))
+    cut: list[Solid] = []
+    for face in range(len(shape.faces)) if not whole.all() else ():
+        zone = solid
+        for normal, level in _mitre_planes(shape, face):
+            zone = zone.beyond(normal, level - OVERLAP_MM)
+        kept = zone
+        for k in np.flatnonzero((cutting[face] & ~whole)[sides]).tolist():
+            kept = kept.beyond(normals[k], float(levels[k]))
+        cut.append(zone - kept)
+    return solid.minus_all(cut)
 
 
-def bevel_planes(shape: MergedClass, insets_mm: Floats, thickness_mm: float) -> tuple[Floats, Floats]:
-    """Unit normals (n, 3) and levels (n,): the piece lies where normal·p is more than the level of every side."""
-    frames = outline_frames(shape)
-    slope = (insets_mm[1] - insets_mm[0]) / thickness_mm
-    normals = frames[:, :3, 1] - slope[:, None] * frames[:, :3, 2]
-    levels = np.einsum("sk,sk->s", normals, frames[:, :3, 3]) + insets_mm.mean(axis=0)
-    length = np.linalg.norm(normals, axis=1)
-    return normals / length[:, None], levels / length
+def cutting_sides(
+    shape: MergedClass, insets_mm: Floats, thickness_mm: float, pocket_of_side: Solid | None, wall_mm: float
+) -> Bools:
+    """(f, n): which sides' bevels cut which triangles.
+
+    All do, except where the planes of one side, which run aslant in a triangle that is bent against its own, would
+    leave less than a wall before the pockets there. `pocket_of_side` is the pocket in connector coordinates.
+    """
+    count = len(shape.corners)
+    cutting = np.ones((len(shape.faces), count), np.bool_)
+    if pocket_of_side is None:
+        return cutting
+    skirt = max(-float(insets_mm.min()), 0.0) + SKIRT_MM
+    slab, frames = Solid.of(slab_mesh(shape, skirt, thickness_mm)), outline_frames(shape)
+    normals, levels, sides = bevel_planes(shape, insets_mm, thickness_mm)
+    for side, face in enumerate(shape.side_face.tolist()):
+        own = np.isin(sides, np.array([side]))
+        space = slab & pocket_of_side.moved(frames[side])
+        for normal, level in zip(normals[own], levels[own], strict=True):
+            space = space.beyond(normal, float(level))
+        behind = (space.mesh().vertices @ normals.T - levels).min(axis=0)
+        aslant = ~np.isin(np.arange(count), sides_of(shape, face))
+        cutting[face, aslant & np.isin(np.arange(count), sides[behind < wall_mm])] = False
+    return cutting
+
+
+def sides_of(shape: MergedClass, face: int) -> list[int]:
+    """The sides whose bevels a triangle needs: its own, and those that meet in a corner where it has none."""
+    n, own = len(shape.corners), np.flatnonzero(shape.side_face == face).tolist()
+    found = set(own)
+    for corner in (int(v) for v in shape.faces[face] if v < n):
+        meeting = {corner, (corner - 1) % n}
+        if not meeting & set(own):
+            found |= meeting
+    return sorted(found)
+
+
+def _mitre_planes(shape: MergedClass, face: int) -> list[tuple[Floats, float]]:
+    """Normals and levels of the planes that halve the angles at a triangle's folds, the triangle on their far side."""
+    points, normals = np.vstack([shape.corners, shape.inner]), _face_normals(shape)
+    corners, found = shape.faces[face].tolist(), list[tuple[Floats, float]]()
+    for a, b in zip(corners, [*corners[1:], corners[0]], strict=True):
+        other = next((g for g, row in enumerate(shape.faces.tolist()) if g != face and a in row and b in row), None)
+        if other is None:
+            continue
+        along = points[b] - points[a]
+        inward = np.cross(normals[face] + normals[other], along)
+        inward /= np.linalg.norm(inward)
+        found.append((inward, float(inward @ points[a])))
+    return found
+
+
+def bevel_planes(shape: MergedClass, insets_mm: Floats, thickness_mm: float) -> tuple[Floats, Floats, Ints]:
+    """Unit normals (p, 3), levels (p,) and sides (p,): the piece lies where normal·p is more than each level."""
+    frames, found = outline_frames(shape), list[tuple[Floats, Floats]]()
+    heights = np.linspace(-thickness_mm / 2, thickness_mm / 2, len(insets_mm))
+    for (low, below), (high, above) in pairwise(zip(heights.tolist(), insets_mm, strict=True)):
+        slope = (above - below) / (high - low)
+        normals = frames[:, :3, 1] - slope[:, None] * frames[:, :3, 2]
+        levels = np.einsum("sk,sk->s", normals, frames[:, :3, 3]) + below - slope * low
+        length = np.linalg.norm(normals, axis=1)
+        found.append((normals / length[:, None], levels / length))
+    sides = np.tile(np.arange(len(frames)), len(found))
+    return np.concatenate([n for n, _ in found]), np.concatenate([level for _, level in found]), sides
 
 
 def slab_mesh(shape: MergedClass, skirt_mm: float, thickness_mm: float) -> TriMesh:
