@@ -507,7 +507,7 @@ class Overlapping:
     """Pairs of pieces that reach into one another.
 
     `pairs` at their places, by `largest_mm3` at most, which is `largest_percent` of the smaller piece, between `faces`;
-    `swung` more when one piece turns by `swing_degrees` about one of its hinges.
+    `swung` more, by `swung_mm3` at most, when one piece turns by `swing_degrees` about one of its hinges.
     """
 
     pairs: int
@@ -516,6 +516,7 @@ class Overlapping:
     faces: tuple[int, int] | None
     swing_degrees: float
     swung: int
+    swung_mm3: float
 
 
 @dataclass(frozen=True)

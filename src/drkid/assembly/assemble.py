@@ -161,7 +161,8 @@ def _overlap_notes(overlap: Overlapping) -> Iterator[str]:
         )
     if overlap.swung:
         yield (
-            f"{overlap.swung} pairs of pieces meet when one of them turns by {overlap.swing_degrees:g}° about a hinge."
+            f"{overlap.swung} pairs of pieces meet, by {overlap.swung_mm3:.2g} mm³ at most, when one of them turns by "
+            f"{overlap.swing_degrees:g}° about a hinge."
         )
 
 

@@ -1,5 +1,6 @@
 """Overlap: where placed pieces reach into one another."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -87,19 +88,18 @@ def overlapping(
     rest = bodies.overlaps(placed)
     number = {face: piece for piece, face in enumerate(placed.faces)}
     met = {frozenset(number[face] for face in one.faces) for one in rest}
-    swung: set[frozenset[int]] = set()
-    for pair, sides, frames in zip(graph.pieces.tolist(), graph.sides.tolist(), framework.frames, strict=True):
-        for piece, side, frame, partner in zip(pair, sides, frames, reversed(pair), strict=True):
-            others = {partner} | graph.touching(piece, side)
-            left = {other for other in others if frozenset((piece, other)) not in met | swung}
-            for turn in (-swing, swing):
-                motion = placed.motions[piece] @ _turned(frame, turn)
-                for other in sorted(left):
-                    if (
-                        bodies.shared_mm3((placed.parts[piece], motion), (placed.parts[other], placed.motions[other]))
-                        > NOTHING_MM3
-                    ):
-                        swung.add(frozenset((piece, other)))
+    swung: dict[frozenset[int], float] = {}
+    for pieces, sides, frames in zip(graph.pieces.tolist(), graph.sides.tolist(), framework.frames, strict=True):
+        for piece, side, frame, partner in zip(pieces, sides, frames, reversed(pieces), strict=True):
+            others = sorted({partner} | graph.touching(piece, side))
+            for turn, other in itertools.product((-swing, swing), others):
+                pair = frozenset((piece, other))
+                if pair in met:
+                    continue
+                turned = (placed.parts[piece], placed.motions[piece] @ _turned(frame, turn))
+                volume = bodies.shared_mm3(turned, (placed.parts[other], placed.motions[other]))
+                if volume > NOTHING_MM3:
+                    swung[pair] = max(volume, swung.get(pair, 0.0))
     worst = rest[0] if rest else None
     return Overlapping(
         pairs=len(rest),
@@ -108,6 +108,7 @@ def overlapping(
         faces=worst.faces if worst else None,
         swing_degrees=swing,
         swung=len(swung),
+        swung_mm3=max(swung.values(), default=0.0),
     )
 
 

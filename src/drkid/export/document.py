@@ -234,6 +234,7 @@ class OverlapDocument(Model):
     faces: tuple[int, int] | None = Field(default=None, description="of the pair with the largest share")
     swing_degrees: float
     swung: int = Field(ge=0, description="more pairs, when one piece turns by swing_degrees about one of its hinges")
+    swung_mm3: float = Field(ge=0, description="by how much at most")
 
 
 class AssemblyDocument(Model):
