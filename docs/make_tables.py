@@ -2,8 +2,8 @@
 
     python docs/make_tables.py [NAME ...]
 
-`paper`, `choices`, `congruence`, `remesh` and `fabrication` come from benchmarks/results; the others are made anew, from the bundled
-nucleus, by the examples and the command line.
+`paper`, `choices`, `congruence`, `remesh` and `fabrication` come from benchmarks/results; the others are made anew,
+from the bundled nucleus, by the examples and the command line.
 """
 
 import contextlib
