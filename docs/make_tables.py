@@ -2,8 +2,8 @@
 
     python docs/make_tables.py [NAME ...]
 
-`paper`, `choices`, `congruence` and `remesh` come from benchmarks/results; the others are made anew, from the bundled
-nucleus, by the examples and the command line.
+`paper`, `choices`, `congruence`, `remesh` and `fabrication` come from benchmarks/results; the others are made anew,
+from the bundled nucleus, by the examples and the command line.
 """
 
 import contextlib
@@ -32,6 +32,7 @@ PAPER = REPOSITORY / "src" / "drkid" / "report" / "paper_table.toml"
 PAPER_MODELS, NEAR_FACES = ("M4", "M1"), 10  # beside which numbers of faces they stand
 SHAPE_FACES, SHAPE_PALETTES = 172, (2, "universal")
 EXACTNESS = ("exact", "first s", "T %", "d_H(M_s, M_f)", "d_H(M_i, M_f)")
+VERDICTS = ("closes", "closes with strain", "does not close")
 SHAPES = {
     "urocell_mito_bean.nii.gz": "mitochondrion",
     "cells3d_nuclei_labels.ome.tif": "nucleus",
@@ -145,6 +146,30 @@ def _by_shape(rows: list[dict]) -> str:
                 ]
                 printed.append([shape.split(".")[0].replace("_", " "), str(palette), *_exactness(some), *angles])
     return table(["shape", "k", *EXACTNESS, "p95 °", "concave %"], printed)
+
+
+def fabrication() -> str:
+    """Kits of real shapes by solver and process: whether they go together, how large and with which grooves."""
+    rows = json.loads((RESULTS / "fabrication.json").read_text())
+    printed = []
+    for solver, process in dict.fromkeys((r["solver"], r["process"]) for r in rows):
+        some = [r for r in rows if (r["solver"], r["process"]) == (solver, process)]
+        made = [r for r in some if "refused" not in r]
+        verdicts = [r["verdict"] for r in made]
+        grooves = [r["groove_mm"] for r in made]
+        printed.append(
+            [
+                solver,
+                process,
+                str(len(some)),
+                str(sum(not r["failed"] for r in made)),
+                *(str(verdicts.count(one)) for one in VERDICTS),
+                f"{median(r['mean_edge_mm'] for r in made):.1f}",
+                f"{median(mean for mean, _ in grooves):.1f} / {max(most for _, most in grooves):.1f}",
+            ]
+        )
+    head = ["solver, classes", "process", "kits", "pass `drkid check`", *VERDICTS, "edge mm", "groove mm, mean / max"]
+    return table(head, printed)
 
 
 def _exactness(rows: list[dict]) -> list[str]:
@@ -317,7 +342,20 @@ def thickening() -> str:
 
 TABLES = {
     made.__name__: made
-    for made in (paper, choices, congruence, remesh, faces, classes, processes, density, make, inspect, thickening)
+    for made in (
+        paper,
+        choices,
+        congruence,
+        remesh,
+        fabrication,
+        faces,
+        classes,
+        processes,
+        density,
+        make,
+        inspect,
+        thickening,
+    )
 }
 
 

@@ -110,6 +110,7 @@ def test_toml_is_a_spec(text):
         ("choices", "comparison-with-the-paper.md"),
         ("congruence", "palette-solver.md"),
         ("remesh", "mathematics.md"),
+        ("fabrication", "how-to/does-it-go-together.md"),
     ],
 )
 def test_tables_are_those_of_the_benchmarks(name, file):

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import ceil, sqrt
+from math import ceil, cos, pi, sqrt
 
 import numpy as np
 from numba import njit
@@ -115,7 +115,9 @@ def _ground(part: Part, d: Dimensions, width_mm: float, depth_mm: float) -> _Gro
     sections = [_segments(part.solid.cross_section(z)) for z in sorted(heights)]
     low, high = sections[0].min(axis=(0, 1)), sections[0].max(axis=(0, 1))
     ground = _Ground(low, np.zeros(np.ceil((high - low) / STEP_MM).astype(int) + 1))
-    room = np.min([_inside_distance(ground.nodes, s) for s in sections], axis=0) - (needed + width_mm / 2 + BETWEEN_MM)
+    room = np.min([_inside_distance(ground.nodes, s) for s in sections], axis=0) - (
+        needed + _reach_mm(width_mm) + BETWEEN_MM
+    )
     return _Ground(low, room.reshape(ground.room_mm.shape))
 
 
@@ -196,8 +198,13 @@ def _own_ticks(
     return groups[free[0]] if len(free) else None
 
 
+def _reach_mm(width_mm: float) -> float:
+    """How far a stroke of this width reaches from its middle line: the corners of its round ends lie outside."""
+    return width_mm / 2 / cos(pi / ROUND)
+
+
 def _engraving(lines: Floats, width_mm: float, low: float, high: float) -> Solid:
     """What strokes with round ends remove."""
     angle = 2 * np.pi * (np.arange(ROUND) + 0.5) / ROUND
-    end = width_mm / 2 / np.cos(np.pi / ROUND) * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    end = _reach_mm(width_mm) * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     return Solid.prism_along_z([np.concatenate([a + end, b + end]) for a, b in lines], low, high)
