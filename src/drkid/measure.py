@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import igl
 import numpy as np
+from scipy.sparse import coo_array
 
-from drkid.mesh import Bools, Floats, Ints, TriMesh, read_only, summed
+from drkid.mesh import Bools, Floats, Ints, TriMesh, read_only
 
 CONCAVE_DEGREES = 1.0  # a joint counts as concave when its inner angle is above 180° by more than this
 NORMAL_SMOOTHING = 5  # rounds of averaging of vertex normals: voxels leave ripples in them
@@ -109,7 +110,8 @@ def smooth_normals(mesh: TriMesh) -> Floats:
     """(V, 3): unit vertex normals, averaged with their neighbours a few times."""
     normals, every = mesh.vertex_normals, np.arange(len(mesh.vertices))
     here, there = np.concatenate([every, *mesh.edges.T]), np.concatenate([every, *mesh.edges[:, ::-1].T])
+    neighbours = coo_array((np.ones(len(here)), (here, there)), shape=(len(every), len(every))).tocsr()
     for _ in range(NORMAL_SMOOTHING):
-        total = summed(here, normals[there], len(every))
+        total = neighbours @ normals
         normals = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), np.finfo(float).tiny)
     return normals

@@ -23,9 +23,9 @@ from drkid.remesh.surface_fit import Points, Region, SurfaceFit
 
 MOST_PEAKS = 12  # that are lowered: by then the next one is about as high
 RINGS = 3  # of neighbours around a peak that move with it
-FEWEST_VERTICES, MOST_VERTICES = 10, 40  # of the surface, for each of the mesh, at which distances are measured
+FEWEST_VERTICES, MOST_VERTICES = 10, 20  # of the surface, for each of the mesh, at which distances are measured
 LATTICE = np.array([(i, j, 3 - i - j) for i in range(4) for j in range(4 - i)]) / 3  # points of a face, the same
-STEPS = 4  # of least squares after a move
+STEPS = 3  # of least squares after a move
 NEAREST = 3  # vertices that are tried at a peak
 FAR = 3.0  # root mean squares, from which a vertex of the surface pulls at the mesh as the fit's points do
 MOST_PEAK = 100.0  # mean squares that a distance's weight grows with: a single point then pulls like its surroundings

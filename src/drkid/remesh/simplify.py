@@ -28,7 +28,7 @@ from drkid.spec import KitSpec
 
 MOST_VERTICES = 50_000  # a hundred thousand pieces: nobody assembles more, and memory stays below a few GB
 FINENESS = 10  # vertices of the surface for each one wanted: cells of its vertices then have shapes
-CELL_TRIANGLES, FEWEST_TRIANGLES = 30, 6000  # for each cell and in all, that integrals over cells are taken on
+CELL_TRIANGLES, FEWEST_TRIANGLES = 20, 6000  # for each cell and in all, that integrals over cells are taken on
 EVENING = 6  # rounds of flips and relaxation after a collapse, which is uneven; later ones find no flip to make
 RELAXATIONS = 3  # in each of these rounds
 SLIVER_DEGREES = 12.0  # a face with a smaller angle is too narrow for a piece

@@ -24,7 +24,7 @@ PEAK_EDGE = 0.3  # the same of an edge's error: more widens the narrowest angles
 DAMPING = 0.02  # of a step, in units of the springs; without it, vertices slide where the surface is flat
 REACH = 0.3  # most of a mean edge that a vertex moves in a step: beyond it the closest points are others
 SOLVED, MOST_SOLVER_STEPS = 1e-6, 60  # squared residual, against that of no step, at which the solver stops
-POINTS, FEWEST_POINTS = 10, 3000  # of the surface, for each vertex and in all
+POINTS, FEWEST_POINTS = 6, 3000  # of the surface, for each vertex and in all
 RULE = np.array([[2 / 3, 1 / 6, 1 / 6], [1 / 6, 2 / 3, 1 / 6], [1 / 6, 1 / 6, 2 / 3]])  # of degree 2 in a triangle
 
 
