@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from conftest import potato_of
 
+from drkid import expected_distance
 from drkid.errors import InputError
-from drkid.expected_distance import expected_distances, faces_for_distance
+from drkid.expected_distance import ExpectedDistance, expected_distances, faces_for_distance
 from drkid.kit import Source, Surface
 from drkid.measure import hausdorff
 from drkid.mesh import TriMesh
@@ -54,6 +55,15 @@ def test_a_distance_out_of_reach_is_refused():
 def test_what_cannot_be_remeshed_has_no_table(ring):
     two = TriMesh(np.concatenate([ring.vertices, ring.vertices + 9]), np.concatenate([ring.faces, ring.faces + 288]))
     assert expected_distances(body(two), KitSpec()) == ()
+
+
+@pytest.mark.parametrize(("second", "rows"), [(0.4, 0), (0.3, 0), (0.2, 7)])
+def test_a_distance_that_does_not_fall_with_the_faces_is_not_foretold(monkeypatch, ring, second, rows):
+    means = {120: 0.3, 400: second}
+    monkeypatch.setattr(
+        expected_distance, "quick_distance", lambda _surface, _spec, faces: ExpectedDistance(faces, means[faces], 2.0)
+    )
+    assert len(expected_distances(body(ring), KitSpec())) == rows
 
 
 @pytest.mark.parametrize("name", ["urocell_mito_bean.nii.gz", "asteroid_itokawa.obj"])

@@ -49,10 +49,15 @@ def quick_distance(surface: Surface, spec: KitSpec, faces: int) -> ExpectedDista
 
 
 def expected_distances(surface: Surface, spec: KitSpec) -> tuple[ExpectedDistance, ...]:
-    """The table for the faces SHOWN; empty where the surface cannot be remeshed at both ANCHORS."""
+    """The table for the faces SHOWN; empty where the surface cannot be remeshed at both ANCHORS.
+
+    It is empty, too, where more faces bring no smaller distance: a shape so thin for them follows no law.
+    """
     try:
         low, high = (quick_distance(surface, spec, faces) for faces in ANCHORS)
     except DrkidError:
+        return ()
+    if high.mean_percent >= low.mean_percent:
         return ()
     return tuple(_on_law(low, high, faces) for faces in SHOWN)
 

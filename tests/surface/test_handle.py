@@ -13,7 +13,7 @@ from drkid.errors import InputError
 from drkid.intersection import self_intersections
 from drkid.pipeline import read_surface
 from drkid.spec import KitSpec
-from drkid.surface import extract_surface, handle
+from drkid.surface import extract_surface, handle, voxel_surface
 from drkid.surface.handle import without_handles
 from drkid.surface.marching_cubes import grid_surface
 
@@ -84,6 +84,19 @@ def test_of_three_handles_the_wide_ring_outlasts_a_bore_and_a_wire():
     assert (found != mask).sum() < 60
 
 
+@settings(max_examples=4)
+@given(st.permutations([0, 1, 2]), st.tuples(*[st.booleans()] * 3), st.integers(16, 27))
+def test_a_band_is_cut_where_it_is_narrowest(order, mirrored, narrow):
+    mask = np.zeros((44, 30, 34), bool)
+    mask[4:14, 4:24, 4:14] = mask[30:40, 4:24, 4:14] = mask[4:40, 4:24, 4:8] = True
+    mask[12:32, 10:17, 12] = True  # a band seven wide, one thick
+    mask[narrow : narrow + 2, [10, 11, 15, 16], 12] = False  # but for one place
+    mask = mask.transpose(order)[tuple(slice(None, None, -1 if flip else 1) for flip in mirrored)]
+    found, (closing,) = without_handles(np.ascontiguousarray(mask), 0, UNIT)
+    assert genus(found) == 0
+    assert (closing.way, closing.voxels) == ("cut", 3)
+
+
 def test_what_has_few_enough_handles_is_left_alone():
     for mask, most in ((np.pad(ball(), 2), 0), (noisy_ring(), 2), (noisy_ring(), 5)):
         found, closed = without_handles(mask, most, UNIT)
@@ -151,6 +164,16 @@ def test_a_density_keeps_its_surface_away_from_the_handle():
     assert (plain.mesh.genus, closed.mesh.genus) == (1, 0)
     far = [mesh.vertices[np.hypot(*(mesh.vertices[:, :2] - (18, 15)).T) > 4] for mesh in (plain.mesh, closed.mesh)]
     np.testing.assert_array_equal(*far)
+
+
+def test_more_handles_closed_than_asked_are_told(monkeypatch):
+    monkeypatch.setattr(voxel_surface, "without_handles", lambda mask, _, spacing: without_handles(mask, 0, spacing))
+    surface = extract_surface(volume_of(noisy_ring()), KitSpec(max_genus=1))
+    assert surface.mesh.genus == 0
+    assert any("--max-genus 1 left 0" in note for note in surface.notes)
+    monkeypatch.undo()
+    surface = extract_surface(volume_of(noisy_ring()), KitSpec(max_genus=1))
+    assert not any("left 0" in note for note in surface.notes)
 
 
 def test_what_cannot_be_met_is_refused(monkeypatch):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from voxel_shapes import ball, volume_of
+from voxel_shapes import ball, ellipsoid, volume_of
 
 from drkid.intersection import self_intersections
 from drkid.spec import KitSpec
@@ -38,6 +38,16 @@ def test_fairing_keeps_the_volume_and_lessens_the_bend():
     smooth = mesh.moved(faired(mesh, np.array(mesh.vertices), np.array(mesh.vertices), ONES))
     assert smooth.volume == pytest.approx(mesh.volume, rel=0.01)
     assert smooth.areas.sum() < 0.97 * mesh.areas.sum()
+
+
+@pytest.mark.parametrize("height", [1.0, 2.5, 7.0, 10.0])
+def test_long_voxels_lose_no_volume(height):
+    spacing = np.array((1.0, 1.0, height))
+    shape = (44, 44, int(44 / height) + 6)
+    mask = ellipsoid(shape, (np.array(shape) - 1) / 2 * spacing + (0.2, -0.1, 0.3 * height), (18, 15, 20), spacing)
+    surface = extract_surface(volume_of(mask, tuple(spacing)), KitSpec())
+    assert surface.mesh.volume == pytest.approx(mask.sum() * spacing.prod(), rel=0.012)
+    assert surface.max_displacement_voxels < 1
 
 
 def test_faces_that_cut_others_go_back_and_the_rest_stays():

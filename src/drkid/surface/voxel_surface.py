@@ -52,6 +52,7 @@ def surface_of_volume(volume: LabelVolume, spec: KitSpec, progress: Progress) ->
             *inside.notes,
             *_notes(found, rank, taken),
             *_closings(closed, taken, volume),
+            *_more_than_asked(closed, mesh.genus, spec),
             *_notes_of(mesh, moved),
         ),
     )
@@ -118,6 +119,15 @@ def _closings(closed: tuple[Closing, ...], taken: VoxelObject, volume: LabelVolu
             f"in all, {max(one.across for one in left):.3g} {unit} across at most"
         )
     return notes
+
+
+def _more_than_asked(closed: tuple[Closing, ...], genus: int, spec: KitSpec) -> list[str]:
+    if spec.max_genus is None or not closed or genus >= spec.max_genus:
+        return []
+    return [
+        f"--max-genus {spec.max_genus} left {genus}: handles that one patch of voxels closes go together; "
+        f"to keep {spec.max_genus}, close the others in the segmentation"
+    ]
 
 
 def _notes_of(mesh: TriMesh, moved: float) -> list[str]:
