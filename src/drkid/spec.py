@@ -356,10 +356,10 @@ class KitSpec(BaseModel):
         0.0, "Patches", "Merged pieces whose triangles bend by no more than this are made flat.", ge=0, le=45
     )
     merge_shift_percent: float = _field(
-        0.0,
+        5.0,
         "Patches",
-        "How far vertices may leave the surface so that merged pieces need fewer shapes, in percent of the mean edge: "
-        "5 saves some; pockets of narrow corners may then meet, which notes tell. Where lengths are given they stay.",
+        "How far vertices may leave the surface so that merged pieces need fewer shapes, in percent of the mean edge; "
+        "0: not at all. Pockets keep the room that unmerged triangles leave them. Where lengths are given they stay.",
         ge=0,
         le=50,
     )

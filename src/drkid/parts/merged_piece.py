@@ -85,15 +85,14 @@ def merged_solid(shape: MergedClass, insets_mm: Floats, thickness_mm: float, cut
     whole: Bools = np.all(cutting, axis=0)
     for k in np.flatnonzero(whole[sides]).tolist():
         solid = solid.beyond(normals[k], float(levels[k]))
+    low, high = solid.bounds + np.array([[-SKIRT_MM], [SKIRT_MM]])  # no face of a cut lies in one of the piece
     cut: list[Solid] = []
     for face in range(len(shape.faces)) if not whole.all() else ():
-        zone = solid
+        zone = Solid.box(low, high)
         for normal, level in _mitre_planes(shape, face):
             zone = zone.beyond(normal, level - OVERLAP_MM)
-        kept = zone
-        for k in np.flatnonzero((cutting[face] & ~whole)[sides]).tolist():
-            kept = kept.beyond(normals[k], float(levels[k]))
-        cut.append(zone - kept)
+        own = np.flatnonzero((cutting[face] & ~whole)[sides]).tolist()
+        cut += [zone.beyond(-normals[k], -float(levels[k])) for k in own]
     return solid.minus_all(cut)
 
 
@@ -118,20 +117,8 @@ def cutting_sides(
         for normal, level in zip(normals[own], levels[own], strict=True):
             space = space.beyond(normal, float(level))
         behind = (space.mesh().vertices @ normals.T - levels).min(axis=0)
-        aslant = ~np.isin(np.arange(count), sides_of(shape, face))
-        cutting[face, aslant & np.isin(np.arange(count), sides[behind < wall_mm])] = False
+        cutting[face, (shape.side_face != face) & np.isin(np.arange(count), sides[behind < wall_mm])] = False
     return cutting
-
-
-def sides_of(shape: MergedClass, face: int) -> list[int]:
-    """The sides whose bevels a triangle needs: its own, and those that meet in a corner where it has none."""
-    n, own = len(shape.corners), np.flatnonzero(shape.side_face == face).tolist()
-    found = set(own)
-    for corner in (int(v) for v in shape.faces[face] if v < n):
-        meeting = {corner, (corner - 1) % n}
-        if not meeting & set(own):
-            found |= meeting
-    return sorted(found)
 
 
 def _mitre_planes(shape: MergedClass, face: int) -> list[tuple[Floats, float]]:

@@ -16,7 +16,7 @@ from drkid.solid import Solid
 
 APART_CLEARANCES = 3.0  # between two tips that met: most can then swing
 ROUNDS = 4  # a cut for one pair of members is made on all of a shape, which seldom needs another
-NOTHING_MM3 = 1e-6
+NOTHING_MM3 = 1e-9
 MOST_OF_PIECE = 0.02  # of a piece's volume: what more is shared is no tip, and left to the figures of the assembly
 AROUND_MM = 1.0  # beyond what is shared: how far a cut reaches
 MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])

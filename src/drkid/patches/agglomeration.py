@@ -1,7 +1,7 @@
 """Agglomerative clustering of pieces into shapes: the two nearest become one as long as no piece is too far from it.
 
 A shape is the mean of its pieces, laid on one another. Pieces may also be made alike: vertices of M_f are moved, by a
-little, so that all pieces of a shape agree (`distance_geometry`).
+little, so that all pieces of a shape agree (`distance_geometry`) and pockets keep their room (`corner_room`).
 """
 
 from dataclasses import dataclass, replace
@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drkid.mesh import Floats, Ints, TriMesh, read_only
+from drkid.patches.corner_room import CornerRooms, corner_rooms
 from drkid.patches.distance_geometry import Place, made_congruent, place
 from drkid.patches.identity import built_alike, misfits, relabellings
 from drkid.patches.outline import Outlined
@@ -40,6 +41,7 @@ class _Limits:
     tolerance: float
     shift: float
     held: Place
+    apart: CornerRooms
 
 
 def agglomerated(mesh: TriMesh, pieces: list[Outlined], tolerance: float, most_shift: float) -> Shapes:
@@ -55,7 +57,7 @@ def agglomerated(mesh: TriMesh, pieces: list[Outlined], tolerance: float, most_s
         for p in own:
             pieces[p] = pieces[p].turned(relabellings(first, pieces[p])[0])
     shift = most_shift if len(mesh.vertices) <= MOST_MOVED else 0.0
-    limits = _Limits(tolerance, shift, place(mesh))
+    limits = _Limits(tolerance, shift, place(mesh), corner_rooms(mesh, pieces))
     found = _measured(mesh.vertices, pieces, np.arange(len(pieces)))
     at_once, misses, tabu = AT_ONCE, 0, set[tuple[int, int, int]]()
     while misses < MOST_MISSES or not shift:
@@ -111,10 +113,14 @@ def _merged(found: Shapes, chosen: list[tuple[int, int, int]], limits: _Limits) 
     if not limits.shift:
         tried = _measured(found.vertices, pieces, shape)
         return tried if tried.misfit.max() <= limits.tolerance else None
-    vertices = made_congruent(found.vertices, pieces, shape, limits.held)
+    vertices = made_congruent(found.vertices, pieces, shape, limits.held, limits.apart)
     tried = _with_inner(_measured(vertices, pieces, shape))
     moved = limits.held.moved(tried.vertices).max()
-    return tried if moved <= limits.shift and tried.misfit.max() <= limits.tolerance else None
+    return (
+        tried
+        if limits.apart.enough(tried.vertices) and moved <= limits.shift and tried.misfit.max() <= limits.tolerance
+        else None
+    )
 
 
 def _measured(vertices: Floats, pieces: list[Outlined], shape: Ints) -> Shapes:
