@@ -4,13 +4,14 @@ One decomposition a shape (172 faces, two classes) as a kit has it, from it ever
 measure in (w, x, y, z), moulds are printed shapes, mirror images apart, d_H is the mean distance to the surface of the
 scan in percent of its box. Prints two tables and writes results/patches.json.
 
-    python benchmarks/patches.py               about ten minutes
+    python benchmarks/patches.py               about fifteen minutes
     python benchmarks/patches.py --shapes golgi_vesicle.mrc
 """
 
 import argparse
 import json
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 from real_shapes import LABELS, require_data
@@ -29,6 +30,7 @@ from drkid.remesh import simplify
 from drkid.spec import KitSpec
 
 SHAPES = ("urocell_mito_bean.nii.gz", "golgi_vesicle.mrc", "asteroid_itokawa.obj")
+NAMES = dict(zip(SHAPES, ("mitochondrion", "Golgi vesicle", "Itokawa"), strict=True))
 ROUNDS = 5  # of the palette solver
 CURVED: tuple[tuple[str, dict[str, object]], ...] = (
     ("planar", {}),
@@ -40,6 +42,7 @@ CURVED: tuple[tuple[str, dict[str, object]], ...] = (
 )
 MERGES = (2, 5, 6, 7)
 SHIFTS_AND_TOLERANCES = ((0.0, 0.02), (0.0, 0.2), (0.0, 1.0), (5.0, 0.02))  # percent of the edge, mm
+WALLS_MM = 0.02  # tolerance up to which the notes of pieces are looked at for walls that are too thin
 Row = dict[str, float | int | str]
 
 
@@ -91,7 +94,7 @@ def merged_row(decomposition: Decomposition, surface: Surface, size_mm: float, o
     patches = make_patches(decomposition, surface.mesh, spec)
     assert patches is not None, "merge was asked for"
     assert patches.misfit is not None, "merged pieces have a misfit"
-    parts = make_parts(decomposition, spec, patches=patches)
+    notes = make_parts(decomposition, spec, patches=patches).notes if spec.merge_tolerance_mm <= WALLS_MM else ()
     scale = size_mm / float(decomposition.mesh.extents.max())
     apart = hausdorff(surface.mesh, patches.decomposition.mesh, np.random.default_rng(SAMPLING_SEED))
     return {
@@ -103,7 +106,7 @@ def merged_row(decomposition: Decomposition, surface: Surface, size_mm: float, o
         "pieces": len(patches.pieces),
         "moulds": len(patches.merged),
         "single_triangles": sum(len(piece.faces) == 1 for piece in patches.pieces),
-        "thin_walls": sum("have walls of" in note for note in parts.notes),
+        "thin_walls": sum("have walls of" in note for note in notes),
         "misfit_max_mm": float(patches.misfit.max()) * scale,
         "distance_mean_percent": apart.mean * 100 / surface.mesh.diagonal,
     }
@@ -134,6 +137,38 @@ def printed(rows: list[Row]) -> None:
         print("  " + " | ".join(f"{x:.3g}" if isinstance(x, float) else str(x) for x in row.values()), flush=True)
 
 
+def tables(found: list[dict[str, object]]) -> str:
+    """Both tables as docs/curved-and-merged.md has them."""
+    curved = [
+        "| shape | pieces | k | T, % | moulds | gap p95, mm | break mean / p95, ° | d_H mean / max, % | d_H to flat |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    merged = [
+        "| shape | merge | pieces | of them single | M_f as it is, 0.02 mm | 0.2 mm | 1 mm | made alike, 0.02 mm |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for one in found:
+        name, rows = NAMES.get(str(one["shape"]), str(one["shape"])), cast("list[Row]", one["curved"])
+        flat = float(rows[0]["distance_mean_percent"])
+        for row in rows:
+            change = "–" if row is rows[0] else f"{100 * (float(row['distance_mean_percent']) / flat - 1):+.0f} %"
+            curved.append(
+                f"| {name} | {row['kind']} | {row['k']} | {float(row['t_percent']):.2f} | {row['moulds']} "
+                f"| {float(row['gap_p95_mm']):.2f} "
+                f"| {float(row['break_mean_degrees']):.1f} / {float(row['break_p95_degrees']):.1f} "
+                f"| {float(row['distance_mean_percent']):.2f} / {float(row['distance_max_percent']):.2f} | {change} |"
+            )
+        pieces = cast("list[Row]", one["merged"])
+        for merge in dict.fromkeys(int(row["merge"]) for row in pieces):
+            own = [row for row in pieces if row["merge"] == merge]
+            alike = {(float(row["shift_percent"]) > 0, float(row["tolerance_mm"])): row for row in own}
+            counts = " | ".join(
+                str(alike[key]["moulds"]) for key in ((False, 0.02), (False, 0.2), (False, 1.0), (True, 0.02))
+            )
+            merged.append(f"| {name} | {merge} | {own[0]['pieces']} | {own[0]['single_triangles']} | {counts} |")
+    return "\n".join([*curved, "", *merged])
+
+
 def main() -> None:
     """Measure, print, write."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -151,6 +186,7 @@ def main() -> None:
         if result["merged"]:
             printed(result["merged"])  # type: ignore[arg-type]
     arguments.out.write_text(json.dumps(found, indent=1) + "\n")
+    print(tables(found))
 
 
 if __name__ == "__main__":
