@@ -126,7 +126,8 @@ class TriMesh:
 
     @cached_property
     def _edges_and_sides(self) -> tuple[Ints, Ints, Ints]:
-        low, high = self.half_edges.min(axis=1), self.half_edges.max(axis=1)
+        one, other = self.half_edges.T
+        low, high = np.minimum(one, other), np.maximum(one, other)  # of two arrays: an axis of length two is slow
         count = max(len(self.vertices), 1)
         keys = low * count + high  # one number sorts faster than two
         order = _order(keys)
@@ -183,10 +184,9 @@ class TriMesh:
     @cached_property
     def misoriented_edges(self) -> int:
         """Number of two-faced edges through which both faces run in the same direction."""
-        sign = np.where(self.half_edges[:, 0] < self.half_edges[:, 1], 1, -1)
-        total = np.bincount(self.face_edges.ravel(), weights=sign, minlength=len(self.edges))
-        count = np.bincount(self.face_edges.ravel(), minlength=len(self.edges))
-        return int(((count == 2) & (total != 0)).sum())
+        edge = self.face_edges.ravel()
+        upward = np.bincount(edge[self.half_edges[:, 0] < self.half_edges[:, 1]], minlength=len(self.edges))
+        return int(((np.bincount(edge, minlength=len(self.edges)) == 2) & (upward != 1)).sum())
 
     @cached_property
     def pinched_vertices(self) -> int:
