@@ -188,16 +188,9 @@ def _resolved(spec: KitSpec, surface: Surface, unmerged: Decomposition, part_set
             "knuckles": dimensions.knuckles or None,
             "mean_edge_mm": None,
             "fit": False,
-            "mark_depth_mm": _mark_depth_mm(spec),
+            "mark_depth_mm": spec.engraving_depth_mm,
         }
     )
-
-
-def _mark_depth_mm(spec: KitSpec) -> float:
-    """How deep the marks of the pieces are: merged ones bear none."""
-    if spec.merge is not None:
-        return 0.0
-    return spec.preset.mark_depth_mm if spec.mark_depth_mm is None else spec.mark_depth_mm
 
 
 def _patch_choices(spec: KitSpec, patches: Patches | None, triangle_classes: int, scale: float) -> dict[str, object]:

@@ -13,6 +13,7 @@ from drkid.mesh import Floats, Ints, TriMesh
 CIRCLE_SEGMENTS = 48  # facets of a round shape: less than 0.01 mm off the circle at hinge radii
 
 CIRCLE_MM = 0.01
+NEEDLE = 5e-5  # some forty steps of single precision at a part's size
 SLIVER = 1e-3  # corners of outlines that stand out by less are dropped: they are rounding, and make needles of faces
 
 
@@ -102,6 +103,10 @@ class Solid:
         """What lies on the side of the plane normal·p = level to which the normal (3,) points."""
         length = float(np.linalg.norm(normal))
         return Solid(self.body.trim_by_plane(tuple((normal / length).tolist()), level / length))
+
+    def without_needles(self) -> "Solid":
+        """Without edges too short for the single precision of part files; no surface moves by more than `NEEDLE`."""
+        return Solid(self.body.simplify(NEEDLE))
 
     # ---- measured
 

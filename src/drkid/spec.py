@@ -402,6 +402,13 @@ class KitSpec(BaseModel):
         """The manufacturing process's own values."""
         return PROCESSES[self.process] if self.process_values is None else self.process_values
 
+    @property
+    def engraving_depth_mm(self) -> float:
+        """How deep marks are: merged pieces bear none, curved ones only where a depth is given."""
+        if self.merge is not None or (self.patch == "curved" and self.mark_depth_mm is None):
+            return 0.0
+        return self.preset.mark_depth_mm if self.mark_depth_mm is None else self.mark_depth_mm
+
     @classmethod
     def parse(cls, values: dict[str, Any]) -> "KitSpec":
         """A spec from plain values, with errors that a user understands.

@@ -258,12 +258,15 @@ def _parts(folder: Path, kit: KitDocument) -> Check:
     for name in files:
         mesh = read_mesh(folder / name)
         corners, index = np.unique(np.asarray(mesh.triangles).reshape(-1, 3), axis=0, return_inverse=True)
+        surface = TriMesh(corners, index.reshape(-1, 3))
         try:
-            solid = Solid.of(TriMesh(corners, index.reshape(-1, 3)))
+            solid = Solid.of(surface)
         except ValueError as error:
             bad.append(f"{name}: {error}")
             continue
         bad += [] if solid.volume > 0 else [f"{name} has no volume"]
+        cuts = len(self_intersections(surface))
+        bad += [f"{name}: {cuts} pairs of faces cut each other"] if cuts else []
     return Check("parts are solids", not bad, "; ".join(bad) or f"{len(files)} files")
 
 
@@ -410,10 +413,12 @@ def _plates(folder: Path, kit: KitDocument) -> list[Check]:
     bad = "; ".join(f"{one.name}: {one.bridge_mm:.2f} mm is not told" for one in untold)
     needed = "any prints" if preset.longest_bridge_mm is None else f"at most {preset.longest_bridge_mm:g}"
     widest = f"widest {worst.bridge_mm:.2f} mm, of {worst.name}; {needed}"
+    crossing = sum(one.crossing for one in found)
+    met = f", {crossing} of them in one another" if crossing else ""
     off, items = max(one.above_bed_mm for one in found), sum(one.copies for one in found)
     return [
         Check("bridges on the plates", not untold, bad or widest),
-        Check("plates", off <= CLEARANCE_MM, f"{items} items, within {off:.1g} mm of the bed"),
+        Check("plates", off <= CLEARANCE_MM and not crossing, f"{items} items, within {off:.1g} mm of the bed{met}"),
     ]
 
 

@@ -8,7 +8,13 @@ from drkid.verification import verify_kit
 KITS = {
     "fdm": {"process": "fdm", "rounds": 20, "faces": 60, "tolerance_percent": 2},
     "sla": {"process": "sla", "classes": 4, "rounds": 20, "tolerance_percent": 1, "connector": "snap"},
-    "injection": {"process": "injection", "rounds": 20, "tolerance_percent": 2, "bevel_variants": 2, "connector": "box"},
+    "injection": {
+        "process": "injection",
+        "rounds": 20,
+        "tolerance_percent": 2,
+        "bevel_variants": 2,
+        "connector": "box",
+    },
 }
 
 

@@ -68,6 +68,12 @@ def test_everything_is_placed_inside_and_apart(sizes, count):
     check(shapes, [count] * len(shapes), sheet, pack(shapes, [count] * len(shapes), sheet, 1.0))
 
 
+@pytest.mark.parametrize("off", [0.0, 1e-14, 1e-9])
+def test_a_corner_that_stands_twice_changes_nothing(off):
+    shape = Shape((np.vstack([TRIANGLE, TRIANGLE[2] - [off, 2 * off]]),))
+    check([Shape((TRIANGLE,))], [12], SHEET, pack([shape], [12], SHEET, 0.5))
+
+
 def test_what_is_larger_than_the_sheet_is_refused():
     with pytest.raises(ValueError, match="larger than the sheet"):
         pack([Shape((TRIANGLE * 10,))], [1], SHEET, 0.5)

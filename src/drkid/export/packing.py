@@ -16,6 +16,7 @@ from scipy.spatial import ConvexHull
 from drkid.mesh import Bools, Floats
 
 TURNS_DEGREES = (0.0, 180.0, 90.0, 270.0)  # of a shape whose longest side lies along x: half turns pair up triangles
+SHORTEST_SIDE_MM = 1e-6  # of a polygon: shorter ones are rounding, and nothing can be told to lie left of them
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,8 +252,9 @@ class _Filling:
 
 def _nearer(polygon: Floats, x: Floats, y: Floats, gap: float) -> Bools:
     """(len(y), len(x)): whether grid points are inside a convex polygon or nearer to it than `gap`."""
-    following = np.roll(polygon, -1, axis=0)
-    along = following - polygon
+    along = np.roll(polygon, -1, axis=0) - polygon
+    sides = np.hypot(*along.T) > SHORTEST_SIDE_MM
+    polygon, along = polygon[sides], along[sides]
     px, py = x[None, :, None] - polygon[:, 0], y[:, None, None] - polygon[:, 1]
     left = along[:, 0] * py - along[:, 1] * px
     inside = (left > 1e-9).all(axis=-1)

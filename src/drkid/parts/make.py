@@ -326,13 +326,15 @@ def _mirrored(right: Part, dimensions: Dimensions) -> Part:
 
 def _marked(part_set: PartSet, spec: KitSpec) -> PartSet:
     """The parts with their marks, and a note for each that has no room for one."""
-    depth = spec.preset.mark_depth_mm if spec.mark_depth_mm is None else spec.mark_depth_mm
-    if not spec.marks or depth == 0:
+    depth = spec.engraving_depth_mm
+    if not spec.marks or spec.mark_depth_mm == 0:
         return part_set
     if part_set.merged:
         note = "Merged pieces have no one plane inside, and bear no marks."
-        findings_ = tuple(finding for finding in part_set.findings if finding.subject != "marks")
-        return replace(part_set, notes=(*part_set.notes, note), findings=findings_)
+        return replace(part_set, notes=(*part_set.notes, note))
+    if depth == 0:
+        note = "Curved pieces bear no marks, because the ribs between strokes are thinner than a wall: --mark-depth-mm."
+        return replace(part_set, notes=(*part_set.notes, note))
     made, notes_ = list[Part](), list[str]()
     for part in part_set.parts:
         found, missing = marked(part, part_set.dimensions, spec.preset.engrave_width_mm, depth)

@@ -137,7 +137,7 @@ def _part(index: int, shape: MergedClass, body: Solid, dimensions: Dimensions) -
     frames = outline_frames(shape, dimensions.key_bend_degrees / 2)
     if dimensions.connector != "none":
         body = body.minus_all([pocket(dimensions).moved(frame) for frame in frames])
-    return Part(index, _handedness(shape), shape.corners, frames, body)
+    return Part(index, _handedness(shape), shape.corners, frames, body.without_needles())
 
 
 def _handedness(shape: MergedClass) -> Handedness:

@@ -124,7 +124,7 @@ def _process(d: Dimensions, spec: KitSpec) -> Iterator[Finding]:
         yield Finding("connector", "bore", preset.min_hole_mm, bore, "mm", "at least", "a thicker --rod-diameter-mm")
     if d.connector in {"hinge", "snap"}:
         yield Finding("connector", "gap between knuckles", preset.knuckle_gap_mm, d.knuckle_gap_mm, "mm", "at least")
-    if spec.marks and (depth := _mark_depth(spec)):
+    if spec.marks and (depth := spec.engraving_depth_mm):
         yield Finding(
             "marks", "depth", d.thickness_mm - d.min_wall_mm, depth, "mm", "at most", "a lesser --mark-depth-mm"
         )
@@ -148,16 +148,12 @@ def _moulded(d: Dimensions, spec: KitSpec) -> Iterator[Finding]:
     if not preset.draft_degrees:
         return
     upright: list[tuple[str, str, str]] = []
-    if spec.marks and _mark_depth(spec):
+    if spec.marks and spec.engraving_depth_mm:
         upright.append(("marks", "draft of their walls", "engrave the mould with a conical cutter, or --no-marks"))
     if d.connector != "none":
         upright.append(("connector", "draft of its ends", "its ends are upright in the mould: draft them there"))
     for subject, what, remedy in upright:
         yield Finding(subject, what, preset.draft_degrees, 0.0, "degrees", "at least", remedy)
-
-
-def _mark_depth(spec: KitSpec) -> float:
-    return spec.preset.mark_depth_mm if spec.mark_depth_mm is None else spec.mark_depth_mm
 
 
 UPRIGHT_DEGREES = 90.0  # a process that prints any overhang
