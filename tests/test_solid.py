@@ -78,3 +78,15 @@ def test_widest_circle_of_a_union() -> None:
     assert widest_circle_mm(left[None]) == pytest.approx(4, abs=0.02)
     assert widest_circle_mm(np.stack([left, left + np.array([3.0, 0.0])])) == pytest.approx(6, abs=0.02)
     assert widest_circle_mm(np.stack([left, left + np.array([5.0, 0.0])])) == pytest.approx(4, abs=0.02)
+
+
+@pytest.mark.parametrize("off", [1e-5, 3e-5])
+def test_corners_that_nearly_coincide_become_one(off) -> None:
+    """A corner cut by planes that nearly meet in it: three edges of `off`, which single precision would fold over."""
+    box = Solid.box((0, 0, 0), (20, 20, 20))
+    cut = box.beyond(np.array([-1.0, -1.0, -1.0]), -(60 - off))
+    clean = cut.without_needles()
+    assert len(cut.mesh().vertices) == 10
+    assert len(clean.mesh().vertices) == 8
+    assert clean.volume == pytest.approx(box.volume, rel=1e-6)
+    assert box.without_needles() is box

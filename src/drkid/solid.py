@@ -105,8 +105,19 @@ class Solid:
         return Solid(self.body.trim_by_plane(tuple((normal / length).tolist()), level / length))
 
     def without_needles(self) -> "Solid":
-        """Without edges too short for the single precision of part files; no surface moves by more than `NEEDLE`."""
-        return Solid(self.body.simplify(NEEDLE))
+        """With corners nearer than `NEEDLE` made one, which single precision may take past each other in part files.
+
+        As it is where there are none, or where the surface would be closed no more.
+        """
+        mesh = self.mesh()
+        short = mesh.edges[mesh.edge_lengths < NEEDLE]
+        stands = np.arange(len(mesh.vertices))
+        for a, b in short.tolist():
+            stands[stands == stands[b]] = stands[a]
+        faces = stands[mesh.faces]
+        used, index = np.unique(faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)], return_inverse=True)
+        whole = TriMesh(mesh.vertices[used], index.reshape(-1, 3))
+        return Solid.of(whole) if len(short) and whole.is_closed_manifold else self
 
     # ---- measured
 

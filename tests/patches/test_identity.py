@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from drkid.mesh import TriMesh
-from drkid.patches.identity import mirror_corners, relabellings, residuals, shapes
+from drkid.patches.identity import mirror_corners, relabellings, residuals, shapes, symmetrised
 from drkid.patches.outline import outlined
 
 
@@ -77,6 +77,14 @@ def test_a_regular_star_is_its_own_mirror_image_and_a_crooked_one_is_not() -> No
     for mesh, found in ((regular, True), (fan(5, 2), False)):
         piece = outlined(mesh, (0, 1, 2, 3, 4))
         assert bool(mirror_corners(piece.points(mesh), piece, 1e-6)) == found
+
+
+def test_what_is_nearly_its_own_mirror_image_is_made_so() -> None:
+    mesh = fan(5, 2)
+    piece = outlined(mesh, (0, 1, 2, 3, 4))
+    image = (0, 4, 3, 2, 1)
+    even = symmetrised(piece.points(mesh), image)
+    assert mirror_corners(even, piece, 1e-9) == image
 
 
 def test_shapes_stand_within_the_tolerance() -> None:

@@ -49,6 +49,13 @@ def residuals(mesh: TriMesh, pieces: list[Outlined]) -> tuple[Floats, Ints]:
     return least, turn
 
 
+def symmetrised(points: Floats, image: tuple[int, ...]) -> Floats:
+    """The mean of a shape (n, 3) and its mirror image, in which corner `image[i]` is the image of corner i."""
+    mirrored = points[[*image, *range(len(image), len(points))]] * np.array([-1.0, 1.0, 1.0])
+    motion = rigid_fit(mirrored, points)
+    return (points + mirrored @ motion[:3, :3].T + motion[:3, 3]) / 2
+
+
 def built_alike(pieces: list[Outlined]) -> list[list[int]]:
     """Pieces grouped by the pattern of their triangles, whichever corner is first."""
     groups: dict[tuple[tuple[int, ...], ...], list[int]] = defaultdict(list)

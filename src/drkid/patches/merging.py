@@ -8,7 +8,7 @@ from drkid.kit import Decomposition, MergedClass, MergedPiece, Outcome, Patches
 from drkid.mesh import Floats, TriMesh, read_only
 from drkid.patches.agglomeration import agglomerated, renumbered
 from drkid.patches.distance_geometry import place
-from drkid.patches.identity import mirror_corners, misfits
+from drkid.patches.identity import mirror_corners, misfits, symmetrised
 from drkid.patches.matching import paired
 from drkid.patches.outline import Outlined, outlined
 from drkid.patches.vertex_star import starred
@@ -23,7 +23,8 @@ def merged_patches(decomposition: Decomposition, spec: KitSpec, tolerance: float
 
     For fewer shapes vertices leave M_f's surface by `spec.merge_shift_percent` of the mean edge at most, unless the
     lengths of the edges are given: then M_f stays. A shape is the mean of its pieces, or laid into its mean plane where
-    all of its triangles bend by `spec.merge_flat_degrees` at most.
+    all of its triangles bend by `spec.merge_flat_degrees` at most. One that is nearly its own mirror image is made so,
+    where all its pieces stay within the tolerance.
     """
     mesh = decomposition.mesh
     given = decomposition.scale_mm_per_unit is not None
@@ -40,7 +41,9 @@ def merged_patches(decomposition: Decomposition, spec: KitSpec, tolerance: float
         members = np.flatnonzero(found.shape == index).tolist()
         model = found.pieces[members[0]]
         first = _first_corner(mean[: len(model.vertices)])
-        shape = _shape(_turned(mean, model, first), model.turned(first), limit, tolerance)
+        alike = np.stack([found.pieces[p].turned(first).points(mesh) for p in members])
+        even, image = _evened(_turned(mean, model, first), model.turned(first), alike, tolerance)
+        shape = _shape(even, model.turned(first), limit, image)
         classes.append(shape)
         points = np.vstack([shape.corners, shape.inner])
         for p in members:
@@ -84,8 +87,20 @@ def side_lengths(corners: Floats) -> Floats:
     return np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
 
 
-def _shape(points: Floats, piece: Outlined, flat_radians: float, tolerance: float) -> MergedClass:
-    """A piece of these points in its part frame: origin amid its corners, z the mean normal, x along the first side."""
+def _evened(points: Floats, piece: Outlined, alike: Floats, tolerance: float) -> tuple[Floats, tuple[int, ...]]:
+    """A shape that is its own mirror image, with the image of each corner, or the shape as it is and nothing."""
+    image = mirror_corners(points, piece, tolerance)
+    if not image:
+        return points, ()
+    even = symmetrised(points, image)
+    return (even, image) if misfits(even, alike).max() <= tolerance else (points, ())
+
+
+def _shape(points: Floats, piece: Outlined, flat_radians: float, image: tuple[int, ...]) -> MergedClass:
+    """A piece of these points in its part frame: origin amid its corners, z the mean normal, x along the first side.
+
+    `image` are the corners' mirror images, where the shape is its own.
+    """
     count = len(piece.vertices)
     corners, shell = points[:count], TriMesh(points, piece.triangles)
     z = shell.face_normals[0]
@@ -103,7 +118,7 @@ def _shape(points: Floats, piece: Outlined, flat_radians: float, tolerance: floa
         read_only(local[count:].copy()),
         piece.triangles,
         piece.side_face,
-        mirror_corners(local, piece, tolerance),
+        image,
     )
 
 
