@@ -124,5 +124,6 @@ def _differences(side: _Side, model: _Side, size_mm3: float) -> tuple[float, flo
     own, other = both - side.material, both - model.material
     if other.volume < CUT_OFF * size_mm3:
         return float("inf"), float("inf")
-    shape = (own - other).volume + (other - own).volume
-    return abs(own.volume - other.volume) / other.volume, shape / other.volume
+    # Twice, and the lesser: of bodies whose faces all but coincide the kernel gets single operations wrong.
+    shape = min((own - other).volume + (other - own).volume, (own + other).volume - (own & other).volume)
+    return abs(own.volume - other.volume) / other.volume, max(shape, 0.0) / other.volume
