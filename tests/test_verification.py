@@ -216,6 +216,17 @@ def test_what_bridges_too_far_on_a_plate_is_found_unless_it_is_told(copy):
     assert failures(copy) == {"plates"}
 
 
+@pytest.mark.parametrize(("apart_mm", "found"), [(31.0, set()), (29.0, {"plates"})])
+def test_items_that_lie_in_one_another_are_found(copy, apart_mm, found):
+    (copy / "plates").mkdir()
+    slab = Solid.box([0, 0, 0], [30, 30, 5])
+    there = np.eye(4)
+    there[0, 3] = apart_mm
+    plate = three_mf_bytes("plate", [PlateObject("A_left", "#000000", slab.mesh(), [np.eye(4), there])])
+    (copy / "plates" / "plate_01.3mf").write_bytes(plate)
+    assert failures(copy) == found
+
+
 def test_a_broken_plate_is_named(copy):
     (copy / "plates").mkdir()
     (copy / "plates" / "plate_01.3mf").write_bytes(b"{nonsense")
