@@ -287,7 +287,12 @@ def _order(keys: Ints) -> Ints:
 
 def rounded(mesh: TriMesh) -> TriMesh:
     """The mesh with coordinates as STL and 3MF store them, without the triangles that lose a corner by that."""
-    vertices, index = np.unique(mesh.vertices.astype(np.float32) + np.float32(0), axis=0, return_inverse=True)
-    faces = index.ravel()[mesh.faces]
-    whole = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
-    return TriMesh(vertices.astype(np.float64), faces[whole])
+    single = np.asarray(mesh.vertices.astype(np.float32) + np.float32(0), np.float64)
+    return coinciding_joined(single, mesh.faces)
+
+
+def coinciding_joined(vertices: Floats, faces: Ints) -> TriMesh:
+    """The mesh with equal vertices (V, 3) made one, without the triangles that lose a corner by that."""
+    places, index = np.unique(vertices, axis=0, return_inverse=True)
+    named = index.ravel()[faces]
+    return TriMesh(places, named[(named != np.roll(named, 1, axis=1)).all(axis=1)])

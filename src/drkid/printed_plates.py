@@ -57,7 +57,7 @@ def lying(folder: Path) -> tuple[Lying, ...]:
 def _crossing(outlines: list[Floats]) -> Bools:
     """(n,): whether a convex outline reaches into another (separating axis theorem; Ericson 2005, section 5.2.1)."""
     found = np.zeros(len(outlines), np.bool_)
-    boxes = np.array([[np.append(x.min(axis=0), 0.0), np.append(x.max(axis=0), 0.0)] for x in outlines])
+    boxes = np.array([[x.min(axis=0), x.max(axis=0)] for x in outlines])
     for a, b in meeting_boxes(boxes).tolist():
         if max(_separation_mm(outlines[a], outlines[b]), _separation_mm(outlines[b], outlines[a])) < -REACH_MM:
             found[[a, b]] = True

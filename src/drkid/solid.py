@@ -8,7 +8,7 @@ import manifold3d
 import numpy as np
 from numpy.typing import ArrayLike
 
-from drkid.mesh import Floats, Ints, TriMesh
+from drkid.mesh import Floats, Ints, TriMesh, coinciding_joined
 
 CIRCLE_SEGMENTS = 48  # facets of a round shape: less than 0.01 mm off the circle at hinge radii
 
@@ -99,6 +99,10 @@ class Solid:
         """Carried by a 4×4 matrix, column-vector convention."""
         return Solid(self.body.transform(np.ascontiguousarray(matrix[:3, :4])))
 
+    def mirrored(self) -> "Solid":
+        """Its mirror image across the plane x = 0."""
+        return Solid(self.body.mirror((1.0, 0.0, 0.0)))
+
     def beyond(self, normal: Floats, level: float) -> "Solid":
         """What lies on the side of the plane normal·p = level to which the normal (3,) points."""
         length = float(np.linalg.norm(normal))
@@ -114,9 +118,7 @@ class Solid:
         stands = np.arange(len(mesh.vertices))
         for a, b in short.tolist():
             stands[stands == stands[b]] = stands[a]
-        faces = stands[mesh.faces]
-        used, index = np.unique(faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)], return_inverse=True)
-        whole = TriMesh(mesh.vertices[used], index.reshape(-1, 3))
+        whole = coinciding_joined(mesh.vertices[stands], mesh.faces)
         return Solid.of(whole) if len(short) and whole.is_closed_manifold else self
 
     # ---- measured

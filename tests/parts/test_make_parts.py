@@ -331,6 +331,11 @@ def test_a_mean_edge_sets_the_scale() -> None:
     assert made(mesh, fit=True).scale_mm_per_unit == made(mesh).scale_mm_per_unit
 
 
+def test_a_process_without_marks_makes_flat_pieces_without_a_word_of_curved_ones() -> None:
+    smooth = PROCESSES["fdm"].model_copy(update={"mark_depth_mm": 0.0})
+    assert not [note for note in made(icosahedron(), process_values=smooth).notes if "marks" in note]
+
+
 def test_marks_take_material_and_change_no_mould() -> None:
     plain, engraved = (made(sixths(), marks=on) for on in (False, True))
     assert len(plain.parts) == len(engraved.parts)

@@ -1,6 +1,5 @@
 """Overlap: where placed pieces reach into one another."""
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -91,15 +90,14 @@ def overlapping(
     swung: dict[frozenset[int], float] = {}
     for pieces, sides, frames in zip(graph.pieces.tolist(), graph.sides.tolist(), framework.frames, strict=True):
         for piece, side, frame, partner in zip(pieces, sides, frames, reversed(pieces), strict=True):
-            others = sorted({partner} | graph.touching(piece, side))
-            for turn, other in itertools.product((-swing, swing), others):
-                pair = frozenset((piece, other))
-                if pair in met:
-                    continue
-                turned = (placed.parts[piece], placed.motions[piece] @ _turned(frame, turn))
-                volume = bodies.shared_mm3(turned, (placed.parts[other], placed.motions[other]))
-                if volume > NOTHING_MM3:
-                    swung[pair] = max(volume, swung.get(pair, 0.0))
+            others = {partner} | graph.touching(piece, side)
+            pairs = {other: pair for other in sorted(others) if (pair := frozenset((piece, other))) not in met}
+            for turn in (-swing, swing):
+                turned = placed.parts[piece], placed.motions[piece] @ _turned(frame, turn)
+                for other, pair in pairs.items():
+                    volume = bodies.shared_mm3(turned, (placed.parts[other], placed.motions[other]))
+                    if volume > NOTHING_MM3:
+                        swung[pair] = max(volume, swung.get(pair, 0.0))
     worst = rest[0] if rest else None
     return Overlapping(
         pairs=len(rest),
@@ -121,7 +119,7 @@ def _turned(frame: Floats, degrees: float) -> Floats:
 
 
 def meeting_boxes(boxes: Floats) -> Ints:
-    """(m, 2): the pairs, lower first, of boxes (n, 2, 3), given by lowest and highest corner, that meet.
+    """(m, 2): the pairs, lower first, of boxes (n, 2, d), given by lowest and highest corner, that meet.
 
     By a sweep along x: each box is held against those that begin before it ends.
     """

@@ -36,7 +36,6 @@ from drkid.parts.truncation import Truncated, truncated
 from drkid.progress import Progress, silent
 from drkid.spec import FOLLOWING, KitSpec
 
-MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 FIRST_GUESS_THICKNESSES = 4.0  # mean edge of the pieces with which the search for a size begins
 WHOLE_MM = 1e-6
 MOST_OF_SIDE = 0.4  # of the shortest side: how wide a pocket may be that is proposed for its strength
@@ -321,7 +320,7 @@ def _mirrored(right: Part, dimensions: Dimensions) -> Part:
     """The left part of a class: the mirror image of the right one, first side along x again."""
     triangle = (right.corners[:, :2] * [-1, 1])[list(LEFT_CORNERS)]
     frames = side_frames(triangle, dimensions.key_bend_degrees / 2)
-    return Part(right.class_index, "left", _flat(triangle), frames, right.solid.moved(MIRROR), right.class_name)
+    return Part(right.class_index, "left", _flat(triangle), frames, right.solid.mirrored(), right.class_name)
 
 
 def _marked(part_set: PartSet, spec: KitSpec) -> PartSet:
@@ -329,12 +328,8 @@ def _marked(part_set: PartSet, spec: KitSpec) -> PartSet:
     depth = spec.engraving_depth_mm
     if not spec.marks or spec.mark_depth_mm == 0:
         return part_set
-    if part_set.merged:
-        note = "Merged pieces have no one plane inside, and bear no marks."
-        return replace(part_set, notes=(*part_set.notes, note))
     if depth == 0:
-        note = "Curved pieces bear no marks, because the ribs between strokes are thinner than a wall: --mark-depth-mm."
-        return replace(part_set, notes=(*part_set.notes, note))
+        return replace(part_set, notes=(*part_set.notes, *_unmarked(spec)))
     made, notes_ = list[Part](), list[str]()
     for part in part_set.parts:
         found, missing = marked(part, part_set.dimensions, spec.preset.engrave_width_mm, depth)
@@ -343,6 +338,14 @@ def _marked(part_set: PartSet, spec: KitSpec) -> PartSet:
         if missing:
             notes_.append(f"Class {part.name}{hand}: no room for the {', '.join(missing)} inside.")
     return replace(part_set, parts=tuple(made), notes=(*part_set.notes, *notes_))
+
+
+def _unmarked(spec: KitSpec) -> Iterator[str]:
+    """Why pieces that a process could mark bear no marks."""
+    if spec.merge is not None:
+        yield "Merged pieces have no one plane inside, and bear no marks."
+    elif spec.patch == "curved":
+        yield "Curved pieces bear no marks, because the ribs between strokes are thinner than a wall: --mark-depth-mm."
 
 
 def _flat(triangle: Floats) -> Floats:

@@ -19,7 +19,6 @@ ROUNDS = 4  # a cut for one pair of members is made on all of a shape, which sel
 NOTHING_MM3 = 1e-9
 MOST_OF_PIECE = 0.02  # of a piece's volume: what more is shared is no tip, and left to the figures of the assembly
 AROUND_MM = 1.0  # beyond what is shared: how far a cut reaches
-MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 
 
 def tips_cut(
@@ -42,6 +41,7 @@ def tips_cut(
     """
     apart_mm = APART_CLEARANCES * clearance_mm
     motions = [rigid_fit(corners[p.class_index], mesh_mm.vertices[list(p.vertices)]) for p in pieces]
+    back = [np.asarray(np.linalg.inv(motion), np.float64) for motion in motions]
     pairs = _near(pieces)
     solids = list(solids)
     for _ in range(ROUNDS):
@@ -57,12 +57,12 @@ def tips_cut(
             away /= np.linalg.norm(away)
             low, high = shared.bounds + np.array([[-AROUND_MM], [AROUND_MM]])
             box = Solid.box(low, high)
-            cuts[own].append(box.beyond(-away, -float(middle @ away) - apart_mm / 2).moved(_back(motions[a])))
-            cuts[other].append(box.beyond(away, float(middle @ away) - apart_mm / 2).moved(_back(motions[b])))
+            cuts[own].append(box.beyond(-away, -float(middle @ away) - apart_mm / 2).moved(back[a]))
+            cuts[other].append(box.beyond(away, float(middle @ away) - apart_mm / 2).moved(back[b]))
         if not cuts:
             break
         for own, cutters in cuts.items():
-            mirrored = [c.moved(MIRROR) for c in cutters] if achiral[own] else []
+            mirrored = [c.mirrored() for c in cutters] if achiral[own] else []
             solids[own] = solids[own].minus_all([*cutters, *mirrored])
     return solids
 
@@ -82,9 +82,3 @@ def _away(piece: MergedPiece, mesh_mm: TriMesh, point: Floats) -> Floats:
     distance = np.linalg.norm(middles, axis=1)
     nearest = int(distance.argmin())
     return middles[nearest] / distance[nearest]
-
-
-def _back(motion: Floats) -> Floats:
-    back = np.eye(4)
-    back[:3, :3], back[:3, 3] = motion[:3, :3].T, -motion[:3, :3].T @ motion[:3, 3]
-    return back
