@@ -339,8 +339,7 @@ class KitSpec(BaseModel):
     curved_gap_mm: float | None = _field(
         None,
         "Patches",
-        "Largest gap between the curved sides of canonical patches, at 95 of 100 joints; 1.5 clearances when not "
-        "given.",
+        "Largest gap between the curved sides of canonical patches, at 95 of 100 joints; 2 clearances when not given.",
         gt=0,
     )
     subdivision_levels: int = _field(3, "Patches", "Subdivisions of a curved patch into 4 each: 3 make 64.", ge=1, le=4)

@@ -8,11 +8,13 @@ from exact_shapes import decomposed, icosahedron, potato
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from drkid.class_triangle import SAME_LENGTH
-from drkid.curved_patch import barycentric_grid, side_points
+from drkid.class_triangle import SAME_LENGTH, equal_sides
+from drkid.curved_patch import barycentric_grid, monomials, side_points
 from drkid.kit import Decomposition, PartSet, Patches
+from drkid.measure import distance_to_surface
 from drkid.parts import make_parts
-from drkid.patches.canonical_patch import CanonicalPatch, symmetric_bubbles
+from drkid.parts.curved_piece import is_own_mirror_image
+from drkid.patches.canonical_patch import BUBBLES, CanonicalPatch, symmetric_bubbles
 from drkid.spec import KitSpec
 
 SPEC = KitSpec(patch="curved", subdivision_levels=2)
@@ -34,8 +36,9 @@ def patches(d: Decomposition, sagitta: float, bubble: float, lean: float, seed: 
     rng = np.random.default_rng(seed)
     found = []
     for lengths in d.class_lengths:
-        basis = symmetric_bubbles(lengths)
-        inside = 27 * bubble * lengths.mean() * (basis @ rng.uniform(-1, 1, basis.shape[1]))
+        basis = symmetric_bubbles(lengths, equal_sides(lengths))
+        inside = basis @ rng.uniform(-1, 1, basis.shape[1])
+        inside *= bubble * lengths.mean() / np.abs(monomials(BUBBLES, INSIDE) @ inside).max()
         found.append(CanonicalPatch(lengths, sagitta * lengths, np.full(3, lean), inside).surface)
     return Patches(d, curved=tuple(found))
 
@@ -44,7 +47,7 @@ def patches(d: Decomposition, sagitta: float, bubble: float, lean: float, seed: 
 @given(
     st.sampled_from(["icosahedron", "potato"]),
     st.floats(0, 0.25),
-    st.floats(0, 0.2),
+    st.floats(0, 0.1),
     st.floats(-0.6, 0.6),
     st.integers(0, 99),
 )
@@ -111,7 +114,7 @@ def test_a_patch_without_room_is_flattened_and_the_class_named() -> None:
 @given(st.floats(0, 1), st.integers(0, 99))
 def test_flattening_keeps_the_corners_and_goes_straight_to_the_triangle(share, seed) -> None:
     lengths = np.array([1.0, 1.1, 1.25])
-    basis = symmetric_bubbles(lengths)
+    basis = symmetric_bubbles(lengths, equal_sides(lengths))
     patch = CanonicalPatch(
         lengths, 0.1 * lengths, np.full(3, 0.2), basis @ np.random.default_rng(seed).normal(size=basis.shape[1])
     ).surface
@@ -121,3 +124,32 @@ def test_flattening_keeps_the_corners_and_goes_straight_to_the_triangle(share, s
     assert less.points(np.eye(3)) == pytest.approx(corners)
     if share == 0:
         assert less.normals(side_points(0, np.array([0.5]))) == pytest.approx(np.array([[0, 0, 1]]), abs=SAME_LENGTH)
+
+
+@settings(max_examples=3, phases=[Phase.generate])
+@given(st.floats(-0.05, 0.1), st.floats(0.05, 0.15), st.integers(0, 99))
+def test_the_piece_of_a_symmetric_patch_is_its_own_mirror_image(sagitta, bubble, seed) -> None:
+    d = shape("icosahedron")
+    part = make_parts(d, SPEC, patches=patches(d, sagitta, bubble, 0.2, seed)).parts[0]
+    assert part.handedness == "any"
+    mirrored = part.solid.mirrored().mesh()
+    apart = distance_to_surface(mirrored, part.solid.mesh().vertices)
+    turned = np.array([[-0.5, -np.sqrt(0.75), 0], [np.sqrt(0.75), -0.5, 0], [0, 0, 1]])
+    for motion in (turned, turned.T):
+        moved = mirrored.moved(mirrored.vertices @ motion.T)
+        apart = np.minimum(apart, distance_to_surface(moved, part.solid.mesh().vertices))
+    assert apart.max() < 0.005
+
+
+def test_the_piece_of_a_lopsided_patch_is_not() -> None:
+    d = shape("icosahedron")
+    inside = np.zeros(len(BUBBLES))
+    inside[0] = 3 * d.mesh.mean_edge
+    lengths = d.class_lengths[0]
+    patch = CanonicalPatch(lengths, 0.02 * lengths, np.zeros(3), inside).surface
+    assert is_own_mirror_image(lengths, patch), "one corner's term is symmetric about the bisector there"
+    inside[1] = d.mesh.mean_edge
+    patch = CanonicalPatch(lengths, 0.02 * lengths, np.zeros(3), inside).surface
+    assert not is_own_mirror_image(lengths, patch)
+    parts = make_parts(d, SPEC, patches=Patches(d, curved=(patch,))).parts
+    assert [part.handedness for part in parts] == ["right"]

@@ -1,21 +1,25 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from drkid.class_triangle import laid_down, symmetries
-from drkid.curved_patch import side_points
+from drkid.class_triangle import equal_sides, laid_down, symmetries
+from drkid.curved_patch import barycentric_grid, side_points
 from drkid.kit import Decomposition, Outcome
 from drkid.mesh import TriMesh
-from drkid.patches.canonical_fit import canonical_patches
+from drkid.patches.canonical_fit import FIT_LEVELS, canonical_fit, gaps, joint_curves, readings, target_of
 from drkid.patches.canonical_patch import BUBBLES, CanonicalPatch, length_groups, symmetric_bubbles
-from drkid.patches.depth_classes import with_depths
 from drkid.patches.laid_faces import laid_faces
 from drkid.patches.smoothness import assembled, joints
 
 SHARES = np.linspace(0, 1, 9)
 side = st.floats(0.8, 1.3)
+
+
+SMOOTHNESS = 0.005
 
 
 def decomposition(mesh: TriMesh) -> Decomposition:
@@ -30,12 +34,17 @@ def decomposition(mesh: TriMesh) -> Decomposition:
 @pytest.fixture(scope="module")
 def fitted(pebble, potato):
     laid = laid_faces(decomposition(pebble))
-    return laid, canonical_patches(laid, potato, 0.005, 0.05 * pebble.mean_edge)
+    return laid, fit_of(laid, potato, pebble.mean_edge).patches
+
+
+def fit_of(laid, surface, mean_edge: float):
+    curve = length_groups(laid.class_lengths, 3)
+    return canonical_fit(laid, curve, target_of(laid, surface, SMOOTHNESS, 0.05 * mean_edge))
 
 
 def patch_of(lengths, seed: int) -> CanonicalPatch:
     rng = np.random.default_rng(seed)
-    basis = symmetric_bubbles(lengths)
+    basis = symmetric_bubbles(lengths, equal_sides(lengths))
     return CanonicalPatch(lengths, 0.1 * lengths**2, np.full(3, 0.2), basis @ rng.normal(size=basis.shape[1]))
 
 
@@ -94,18 +103,43 @@ def test_rigid_motions_change_no_patch(pebble, fitted, potato, seed) -> None:
     rng = np.random.default_rng(seed)
     turn, shift = Rotation.random(rng=rng).as_matrix(), rng.normal(size=3)
     moved = decomposition(pebble.moved(pebble.vertices @ turn.T + shift))
-    other = canonical_patches(
-        laid_faces(moved), potato.moved(potato.vertices @ turn.T + shift), 0.005, 0.05 * pebble.mean_edge
-    )
-    for one, two in zip(fitted[1], other, strict=True):
+    other = fit_of(laid_faces(moved), potato.moved(potato.vertices @ turn.T + shift), pebble.mean_edge)
+    for one, two in zip(fitted[1], other.patches, strict=True):
         assert two.sagittas == pytest.approx(one.sagittas, abs=1e-5)
         assert two.bubble == pytest.approx(one.bubble, abs=1e-3 * (1 + np.abs(one.bubble).max()))
 
 
-def test_more_depths_lie_nearer(pebble, potato) -> None:
-    d = decomposition(pebble)
-    count = len(d.class_lengths)
-    few, many = (with_depths(d, potato, n, 0.0, 0.05 * pebble.mean_edge) for n in (count, count + 3))
-    assert len(few[2]) == count
-    assert count < len(many[2]) <= count + 3
-    assert (many[0].class_lengths[many[0].face_class] == d.class_lengths[d.face_class]).all()
+@pytest.mark.parametrize("factor", [1e-4, 1e4])
+def test_the_unit_changes_nothing(pebble, fitted, potato, factor) -> None:
+    scaled = decomposition(pebble.scaled(1.0))
+    scaled = replace(scaled, mesh=pebble.scaled(factor), class_lengths=factor * scaled.class_lengths)
+    other = fit_of(laid_faces(scaled), potato.scaled(factor), factor * pebble.mean_edge)
+    for one, two in zip(fitted[1], other.patches, strict=True):
+        assert two.sagittas / factor == pytest.approx(one.sagittas, abs=1e-6)
+        assert two.bubble / factor == pytest.approx(one.bubble, abs=1e-3 * (1 + np.abs(one.bubble).max()))
+
+
+def test_readings_of_a_plane_are_its_heights_and_its_slope() -> None:
+    lengths = np.array([1.0, 1.1, 1.3])
+    points = barycentric_grid(FIT_LEVELS).points
+    height = points @ laid_down(lengths) @ [0.3, -0.2]
+    found = readings(lengths) @ height
+    slopes = found[len(points) :].reshape(2, -1)
+    assert found[: len(points)] == pytest.approx(height)
+    assert slopes[0] == pytest.approx(0.3)
+    assert slopes[1] == pytest.approx(-0.2)
+
+
+def test_sides_with_different_curves_are_not_mirrored() -> None:
+    lengths = np.array([1.0, 1.0, 1.2])
+    same, apart = (symmetric_bubbles(lengths, np.array(curves)) for curves in ((0, 0, 1), (0, 2, 1)))
+    assert same.shape[1] < apart.shape[1] == len(BUBBLES)
+
+
+def test_curves_beyond_the_gap_are_held_back(pebble, potato) -> None:
+    laid = laid_faces(decomposition(pebble))
+    curve = length_groups(laid.class_lengths, 3)
+    for gap in (0.001, 0.01, 0.1):
+        fit = canonical_fit(laid, curve, target_of(laid, potato, SMOOTHNESS, gap * pebble.mean_edge))
+        found = gaps(laid, fit.sagittas, fit.leans)[np.arange(len(laid.joint_face)), joint_curves(laid, curve)]
+        assert np.mean(found <= gap * pebble.mean_edge * (1 + 1e-6)) >= 0.95

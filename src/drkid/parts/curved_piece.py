@@ -11,7 +11,7 @@ outer face does not, its patch is flattened.
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from drkid.class_triangle import inward_normals
+from drkid.class_triangle import inward_normals, symmetries
 from drkid.curved_patch import CurvedPatch, barycentric_grid, gradients
 from drkid.kit import Dimensions
 from drkid.mesh import Floats, Ints, TriMesh
@@ -26,6 +26,7 @@ SKIRT_MM = 1.0  # beyond what stands out of the triangle; the bevels cut it away
 UPRIGHT = 1e-6  # of a unit normal: facets that lean by less are the two faces
 SAME_PLANE = 1e-7
 STEEPEST_COSINE = 0.5  # the outer face of patches that lean more lies no higher over them than at 60°
+SAME_MM = 1e-6  # between a patch and its mirror image: far below what any process can print
 SHARES = np.linspace(1, 0, 21)  # of a patch's height, tried from all of it to none
 
 
@@ -54,6 +55,18 @@ def _footprints(triangle: Floats, d: Dimensions) -> Floats:
     local = np.stack([x, y, np.zeros_like(x), np.ones_like(x)], axis=-1)
     frames = side_frames(triangle, d.key_bend_degrees / 2)
     return np.einsum("sij,yxj->syxi", frames, local)[..., :2].reshape(-1, 2)
+
+
+def is_own_mirror_image(lengths: Floats, patch: CurvedPatch) -> bool:
+    """Whether a reflection of the triangle of side `lengths` (3,), in mm, carries the patch onto itself."""
+    at = barycentric_grid(2).points
+    points, image = patch.points(at), np.empty_like(at)
+    for permutation, matrix in symmetries(lengths):
+        image[:, list(permutation)] = at
+        apart = patch.points(image) - np.column_stack([points[:, :2] @ matrix.T, points[:, 2]])
+        if np.linalg.det(matrix) < 0 and np.abs(apart).max() < SAME_MM:
+            return True
+    return False
 
 
 def outer_margin(triangle: Floats, prismoid: Prismoid, patch: CurvedPatch, lift_mm: float, wall_mm: float) -> Margin:
@@ -90,8 +103,9 @@ def block_mesh(
 ) -> TriMesh:
     """What lies between z = `heights_mm[0]` and the surface at the other height over the patch.
 
-    The patch goes on over its sides by a skirt, along its tangents. Heights are measured upright and made up for the
-    slope: a surface that bends more than its thickness allows does not fold.
+    The patch goes on over its sides by a skirt, along its tangents, each of whose quadrilaterals has a point in its
+    middle: a diagonal would not be its own mirror image. Heights are measured upright and made up for the slope: a
+    surface that bends more than its thickness allows does not fold.
     """
     grid, ring = barycentric_grid(levels), _ring(levels)
     inradius_mm = float((inward_normals(triangle)[0] * (_incentre(triangle) - triangle[0])).sum())
@@ -102,12 +116,15 @@ def block_mesh(
     points = np.vstack([patch.points(grid.points), skirt])
     rise = np.maximum(patch.normals(np.vstack([grid.points, border]))[:, 2], STEEPEST_COSINE)
     upper = points + np.column_stack([np.zeros((len(points), 2)), heights_mm[1] / rise])
-    lower = np.column_stack([points[:, :2], np.full(len(points), heights_mm[0])])
-    count, outside = len(points), len(grid.points) + np.arange(len(ring))
-    ahead, after = np.roll(ring, -1), np.roll(outside, -1)
+    outside = len(grid.points) + np.arange(len(ring))
+    ahead, after, middle = np.roll(ring, -1), np.roll(outside, -1), len(upper) + np.arange(len(ring))
+    loop = np.stack([ahead, ring, outside, after])
+    upper = np.vstack([upper, upper[loop].mean(axis=0)])
+    lower = np.column_stack([upper[:, :2], np.full(len(upper), heights_mm[0])])
     face = np.vstack([
-        grid.faces, np.stack([ahead, ring, outside], axis=1), np.stack([ahead, outside, after], axis=1)
+        grid.faces, *(np.stack([a, b, middle], axis=1) for a, b in zip(loop, np.roll(loop, -1, axis=0), strict=True))
     ])  # fmt: skip
+    count = len(upper)
     walls = [
         np.stack([outside, after, after + count], axis=1), np.stack([outside, after + count, outside + count], axis=1)
     ]  # fmt: skip

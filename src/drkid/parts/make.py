@@ -8,7 +8,7 @@ from math import ceil, degrees
 
 import numpy as np
 
-from drkid.class_triangle import LEFT_CORNERS, is_mirror_symmetric, laid_down, printed_lengths
+from drkid.class_triangle import LEFT_CORNERS, is_mirror_symmetric, laid_down, printed_lengths, symmetrised
 from drkid.curved_patch import CurvedPatch
 from drkid.errors import FitError
 from drkid.kit import Connector, Decomposition, Dimensions, Handedness, Part, PartSet, Patches
@@ -16,7 +16,7 @@ from drkid.mesh import Floats, Ints, read_only
 from drkid.parts.bevel import require_bends
 from drkid.parts.bevel_variants import Moulds, moulds
 from drkid.parts.coupon import coupon
-from drkid.parts.curved_piece import SHARES, curved_solid, needed_lift_mm, outer_margin
+from drkid.parts.curved_piece import SHARES, curved_solid, is_own_mirror_image, needed_lift_mm, outer_margin
 from drkid.parts.dimensions import proposals
 from drkid.parts.fit import FITS_MM, Margin, corner_room_mm, margins, smallest_scale
 from drkid.parts.groove import groove_mm
@@ -305,13 +305,14 @@ def _parts(design: _Design, shapes: tuple[Prismoid, ...], scale: float) -> tuple
 def _right_part(design: _Design, index: int, shape: Prismoid, scale: float) -> Part:
     triangle = design.triangles(scale)[index]
     frames = side_frames(triangle, design.dimensions.key_bend_degrees / 2)
-    solid = shape.solid
+    solid, symmetric = shape.solid, is_mirror_symmetric(design.decomposition.class_lengths[index])
     if design.curved:
         patch, levels = design.curved[index].scaled(scale), design.spec.subdivision_levels
         solid = curved_solid(triangle, patch, shape, design.lift_mm(scale), levels)
+        lengths = printed_lengths(symmetrised(design.decomposition.class_lengths)[index], scale)
+        symmetric = symmetric and is_own_mirror_image(lengths, patch)
     if design.dimensions.connector != "none":
         solid = solid.minus_all([pocket(design.dimensions).moved(frame) for frame in frames])
-    symmetric = is_mirror_symmetric(design.decomposition.class_lengths[index])
     hand: Handedness = "any" if symmetric else "right"
     return Part(index, hand, _flat(triangle), frames, solid, design.moulds.name(index))
 

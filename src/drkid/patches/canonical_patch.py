@@ -3,7 +3,7 @@
 Over its triangle a patch is P(b) = Σ bᵢvᵢ + Σᵢ 4sᵢ bᵢbᵢ₊₁ (cos φᵢ z − sin φᵢ yᵢ) + b₀b₁b₂ q(b) z: barycentric b, unit
 normal z, unit inward normal yᵢ of side i. The second term alone remains on the sides: there the patch is a planar
 parabola of sagitta sᵢ, leaning outwards by φᵢ. Both depend on nothing but the length of the side, so that any two
-sides of one length have the same curve, and pieces meet along it exactly where the joint bends by 2φ. The quadratic
+sides of one length have the same curve, and pieces meet along it exactly where the joint bends by 2φ. The
 polynomial q is what is left to choose: the bubble of a Bernstein-Bézier triangle (Farin, "Curves and surfaces for
 CAGD", chapter 17).
 """
@@ -20,15 +20,17 @@ from drkid.mesh import Floats, Ints, read_only
 ARCS = np.array([[1, 1, 0], [0, 1, 1], [1, 0, 1]])
 """Exponents in (b₀, b₁, b₂) of the term of each side."""
 
-BUBBLES = np.array([np.bincount(pair, minlength=3) + 1 for pair in combinations_with_replacement(range(3), 2)])
-"""(6, 3): exponents of the terms that vanish on all sides."""
+DEGREE = 5  # of q: a quadratic cannot follow both the surface and the bends at the sides
+
+BUBBLES = np.array([np.bincount(term, minlength=3) + 1 for term in combinations_with_replacement(range(3), DEGREE)])
+"""(21, 3): exponents of the terms that vanish on all sides."""
 
 
 @dataclass(frozen=True, eq=False)
 class CanonicalPatch:
     """A class's curved middle surface over its triangle of side `lengths` (3,), in their unit.
 
-    `sagittas` (3,) and `leans` (3,), in radians, of the sides; `bubble` (6,) multiplies the terms of `BUBBLES`.
+    `sagittas` (3,) and `leans` (3,), in radians, of the sides; `bubble` (21,) multiplies the terms of `BUBBLES`.
     """
 
     lengths: Floats
@@ -60,11 +62,17 @@ def barycentric_gradients(lengths: Floats) -> Floats:
     return inward / height[:, None]
 
 
-def symmetric_bubbles(lengths: Floats) -> Floats:
-    """(6, r): a basis of the bubbles that every symmetry of the class, reflections included, leaves as they are."""
+def symmetric_bubbles(lengths: Floats, curves: Ints) -> Floats:
+    """(b, r): a basis of the bubbles that every symmetry of the class, reflections included, leaves as they are.
+
+    A symmetry must also carry each side to one that has the same boundary curve; `curves` (3,) numbers them.
+    """
     number = {tuple(row): i for i, row in enumerate(BUBBLES.tolist())}
+    side = {frozenset((i, (i + 1) % 3)): int(c) for i, c in enumerate(curves)}
     orbit = np.arange(len(BUBBLES))
     for permutation, _ in symmetries(lengths):
+        if any(side[frozenset(permutation[i] for i in pair)] != c for pair, c in side.items()):
+            continue
         for i, row in enumerate(BUBBLES.tolist()):
             image = number[tuple(row[p] for p in permutation)]
             orbit[orbit == orbit[image]] = orbit[i] = min(orbit[i], orbit[image])

@@ -8,14 +8,14 @@ from drkid.curved_patch import CurvedPatch
 from drkid.kit import CurvedFigures, Decomposition, Patches
 from drkid.measure import bend_radians
 from drkid.mesh import TriMesh
-from drkid.patches.depth_classes import with_depths
+from drkid.patches.canonical_classes import canonical_classes
 from drkid.patches.laid_faces import LaidFaces, laid_faces
 from drkid.patches.published_patch import curvature_space, published_patches
 from drkid.patches.smoothness import assembled, joints
 from drkid.spec import KitSpec
 
-SMOOTHNESS = 0.004  # weight of tangent breaks: the distance to the surface gives way by a tenth for them
-GAP_CLEARANCES = 1.5  # the gap at 95 of 100 joints in clearances; what two halves in their pockets give is 2
+SMOOTHNESS = 0.002  # weight of tangent breaks: the distance to the surface gives way a little for them
+GAP_CLEARANCES = 2.0  # the gap at 95 of 100 joints in clearances: what two halves in their pockets give
 MEAN_EDGE_CLEARANCES = 200.0  # mean edge of a print in clearances where no size is given: 40 mm by fdm
 PERCENTILE = 95
 
@@ -31,7 +31,7 @@ def curved_patches(decomposition: Decomposition, surface: TriMesh, spec: KitSpec
         threshold, allowance = found.threshold_percent, None
     else:
         allowance = most_gap(decomposition, spec)
-        divided, laid, canonical = with_depths(decomposition, surface, classes, SMOOTHNESS, allowance)
+        divided, laid, canonical = canonical_classes(decomposition, surface, classes, SMOOTHNESS, allowance)
         shapes = tuple(patch.surface for patch in canonical)
         threshold = _threshold_percent(laid, shapes, spec.subdivision_levels)
     figures = _figures(decomposition, laid, shapes, threshold, spec.subdivision_levels)
