@@ -1,8 +1,8 @@
 """Curved and merged pieces of real shapes: planar, curved as the paper has it, canonical; triangles merged.
 
 One decomposition a shape (172 faces, two classes) as a kit has it, from it every kind of piece. T is the paper's
-measure in (w, x, y, z), moulds are printed shapes, mirror images apart, d_H is the mean distance to the surface of the
-scan in percent of its box. Prints two tables and writes results/patches.json.
+measure in (w, x, y, z), moulds are printed shapes, mirror images apart, normals is the mean angle to the surface of the
+scan, d_H the mean distance to it in percent of its box. Prints two tables and writes results/patches.json.
 
     python benchmarks/patches.py               about fifteen minutes
     python benchmarks/patches.py --shapes golgi_vesicle.mrc
@@ -19,7 +19,8 @@ from real_shapes import LABELS, require_data
 from drkid.congruence import decompose
 from drkid.curved_patch import barycentric_grid
 from drkid.kit import Decomposition, Surface
-from drkid.measure import bend_radians, hausdorff
+from drkid.measure import bend_radians, hausdorff, project
+from drkid.mesh import TriMesh
 from drkid.metrics import SAMPLING_SEED
 from drkid.parts import make_parts
 from drkid.patches import flattened_patches, make_patches
@@ -38,10 +39,13 @@ CURVED: tuple[tuple[str, dict[str, object]], ...] = (
     ("published", {"patch": "curved", "curved": "published", "curved_classes": 10}),
     ("canonical", {"patch": "curved", "curved_classes": 2}),
     ("canonical", {"patch": "curved", "curved_classes": 4}),
+    ("canonical", {"patch": "curved", "curved_classes": 6}),
     ("canonical", {"patch": "curved", "curved_classes": 8}),
+    ("canonical", {"patch": "curved", "curved_classes": 16}),
 )
 MERGES = (2, 5, 6, 7)
 SHIFTS_AND_TOLERANCES = ((0.0, 0.02), (0.0, 0.2), (0.0, 1.0), (5.0, 0.02))  # percent of the edge, mm
+FINE = 10_000  # places at least at which normals are compared
 WALLS_MM = 0.02  # tolerance up to which the notes of pieces are looked at for walls that are too thin
 Row = dict[str, float | int | str]
 
@@ -69,11 +73,27 @@ def curved_row(surface: Surface, decomposition: Decomposition, kind: str, option
         "break_p95_degrees": float(np.percentile(bend, 95)) if figures is None else figures.break_p95,
         "distance_mean_percent": apart.mean * percent,
         "distance_max_percent": apart.max * percent,
+        "normals_mean_degrees": _normals_apart(surface.mesh, assembled),
         "least_distance_percent": _least(surface, decomposition),
         "patch_share": parts.patch_share,
         "size_mm": decomposition.mesh.extents.max() * scale,
         "mean_edge_mm": decomposition.mesh.mean_edge * scale,
     }
+
+
+def _normals_apart(surface: TriMesh, assembled: TriMesh) -> float:
+    """The mean angle between the assembled surface and the tangent plane of M_i nearest to it, by area."""
+    count = len(assembled.faces)
+    levels = max(0, int(np.ceil(np.log(FINE / count) / np.log(4))))
+    at = barycentric_grid(levels)
+    centres = at.points[at.faces].mean(axis=1)
+    points = np.einsum("nk,fkc->fnc", centres, assembled.corners)
+    face = project(surface, points.reshape(-1, 3))[1]
+    normal = surface.vertex_normals[surface.faces[face]].mean(axis=1)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    cosine = np.einsum("nc,nc->n", normal, np.repeat(assembled.face_normals, len(centres), axis=0))
+    angle = np.degrees(np.arccos(np.clip(cosine, -1, 1))).reshape(count, -1).mean(axis=1)
+    return float(np.average(angle, weights=assembled.areas))
 
 
 def _least(surface: Surface, decomposition: Decomposition) -> float:
@@ -140,8 +160,9 @@ def printed(rows: list[Row]) -> None:
 def tables(found: list[dict[str, object]]) -> str:
     """Both tables as docs/curved-and-merged.md has them."""
     curved = [
-        "| shape | pieces | k | T, % | moulds | gap p95, mm | break mean / p95, ° | d_H mean / max, % | d_H to flat |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| shape | pieces | k | T, % | moulds | gap p95, mm | break mean / p95, ° | normals, ° "
+        "| d_H mean / max, % | d_H to flat |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     merged = [
         "| shape | merge | pieces | of them single | M_f as it is, 0.02 mm | 0.2 mm | 1 mm | made alike, 0.02 mm |",
@@ -156,6 +177,7 @@ def tables(found: list[dict[str, object]]) -> str:
                 f"| {name} | {row['kind']} | {row['k']} | {float(row['t_percent']):.2f} | {row['moulds']} "
                 f"| {float(row['gap_p95_mm']):.2f} "
                 f"| {float(row['break_mean_degrees']):.1f} / {float(row['break_p95_degrees']):.1f} "
+                f"| {float(row['normals_mean_degrees']):.1f} "
                 f"| {float(row['distance_mean_percent']):.2f} / {float(row['distance_max_percent']):.2f} | {change} |"
             )
         pieces = cast("list[Row]", one["merged"])

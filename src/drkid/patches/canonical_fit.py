@@ -22,7 +22,7 @@ from drkid.patches.laid_faces import LaidFaces
 
 FIT_LEVELS = 3  # of the grid at which patches are held against the surface
 FARTHEST = 0.5  # of the mean edge: where the surface is farther from a face, it says nothing about its curvature
-FAIRNESS = 0.008  # weight of squared slopes, in mean edges, against squared heights: patches are no trays
+FAIRNESS = 0.006  # weight of squared slopes, in mean edges, against squared heights: patches are no trays
 ALONG = np.array([0.1, 0.3, 0.5, 0.7, 0.9])  # shares of a side at which tangents are held together
 PERCENTILE = 95
 NEGLIGIBLE = 1e-13  # of the largest eigenvalue: what the faces say nothing about stays as it is on a flat patch

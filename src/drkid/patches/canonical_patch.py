@@ -2,10 +2,9 @@
 
 Over its triangle a patch is P(b) = Σ bᵢvᵢ + Σᵢ 4sᵢ bᵢbᵢ₊₁ (cos φᵢ z − sin φᵢ yᵢ) + b₀b₁b₂ q(b) z: barycentric b, unit
 normal z, unit inward normal yᵢ of side i. The second term alone remains on the sides: there the patch is a planar
-parabola of sagitta sᵢ, leaning outwards by φᵢ. Both depend on nothing but the length of the side, so that any two
-sides of one length have the same curve, and pieces meet along it exactly where the joint bends by 2φ. The
-polynomial q is what is left to choose: the bubble of a Bernstein-Bézier triangle (Farin, "Curves and surfaces for
-CAGD", chapter 17).
+parabola of sagitta sᵢ, leaning outwards by φᵢ. A length has one such curve or a few, and the two sides at a joint have
+the same, so that pieces meet along it, exactly where the joint bends by 2φ. The polynomial q is what is left to choose:
+the bubble of a Bernstein-Bézier triangle (Farin, "Curves and surfaces for CAGD", chapter 17).
 """
 
 from dataclasses import dataclass
