@@ -10,6 +10,7 @@ from drkid.measure import bend_radians
 from drkid.mesh import Bools, Floats, TriMesh, read_only
 from drkid.parts.bevel import bevel_insets, flippable_insets, limited, ridged
 from drkid.parts.dimensions import deepest_bevel_mm, held_height_mm
+from drkid.parts.foot import with_foot
 from drkid.parts.merged_piece import (
     bevel_planes,
     cutting_sides,
@@ -51,6 +52,8 @@ def merged_parts(patches: Patches, of_triangles: PartSet, spec: KitSpec, notes: 
         dimensions.clearance_mm,
     )
     parts = tuple(_part(k, shape, bodies[k], dimensions) for k, shape in enumerate(shapes))
+    pockets = [_deep(body, shape, dimensions) for shape, body in zip(shapes, bodies, strict=True)]
+    parts, feet = _printable(parts, pockets, dimensions, spec)
     face_part = np.zeros(len(mesh_mm.faces), np.int64)
     for piece in patches.pieces:
         face_part[list(piece.faces)] = piece.class_index
@@ -60,7 +63,7 @@ def merged_parts(patches: Patches, of_triangles: PartSet, spec: KitSpec, notes: 
         face_part=read_only(face_part),
         face_turn=read_only(np.zeros(len(face_part), np.int64)),
         groove_mm=read_only(_grooves(mesh_mm, patches.pieces, insets, dimensions)),
-        notes=(*notes, *_wall_notes(list(zip(shapes, insets, cutting, bodies, strict=True)), dimensions)),
+        notes=(*notes, *_wall_notes(list(zip(shapes, insets, cutting, bodies, strict=True)), dimensions), *feet),
         findings=tuple(finding for finding in of_triangles.findings if not finding.subject.startswith("class ")),
         groove_choices=(),
         merged=patches.pieces,
@@ -138,6 +141,36 @@ def _part(index: int, shape: MergedClass, body: Solid, dimensions: Dimensions) -
     if dimensions.connector != "none":
         body = body.minus_all([pocket(dimensions).moved(frame) for frame in frames])
     return Part(index, _handedness(shape), shape.corners, frames, body.without_needles())
+
+
+def _deep(body: Solid, shape: MergedClass, dimensions: Dimensions) -> Floats:
+    """(n, 3): corners of the inner halves of a piece's pockets, that which a connector is held by."""
+    if dimensions.connector == "none":
+        return np.zeros((0, 3))
+    half = pocket(dimensions).beyond(np.array([0.0, 1.0, 0.0]), dimensions.pocket_depth_mm / 2)
+    frames = outline_frames(shape, dimensions.key_bend_degrees / 2)
+    return np.vstack([(body & half.moved(frame)).mesh().vertices for frame in frames])
+
+
+def _printable(
+    parts: tuple[Part, ...], deep: list[Floats], dimensions: Dimensions, spec: KitSpec
+) -> tuple[tuple[Part, ...], list[str]]:
+    """The parts with feet where they need them to print without supports, and a note that tells which have one."""
+    longest = spec.preset.longest_bridge_mm
+    if longest is None:
+        return parts, []
+    thickness, wall = dimensions.thickness_mm, dimensions.min_wall_mm
+    found = [
+        with_foot(part.solid, own, thickness, wall, longest, part.handedness == "any")
+        for part, own in zip(parts, deep, strict=True)
+    ]
+    footed = [part.name for part, (_, depth) in zip(parts, found, strict=True) if depth]
+    note = (
+        f"Class {', '.join(footed)}: a flat of up to {max(depth for _, depth in found):.1f} mm is cut off the rim, on "
+        "which the piece prints without supports."
+    )
+    parts = tuple(replace(part, solid=solid) for part, (solid, _) in zip(parts, found, strict=True))
+    return parts, [note] if footed else []
 
 
 def _handedness(shape: MergedClass) -> Handedness:
