@@ -18,7 +18,7 @@ def hexagon(radius: float, z: float) -> Floats:
     angle = np.pi / 2 + np.arange(6) * np.pi / 3
     rim = radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     rim[0] *= 1.1
-    return rim + [0.0, 0.0, z]
+    return rim + np.array([0.0, 0.0, z])
 
 
 def dome() -> Solid:
