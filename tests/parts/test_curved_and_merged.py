@@ -102,3 +102,10 @@ def test_curved_shell_is_as_thick_as_stated_along_its_normal(levels, flattened) 
     top = parts.parts[0].solid.bounds[1, 2]
     assert top == pytest.approx(middle[2] + thickness / 2, abs=flattened * thickness)
     assert patch.points(np.eye(3))[:, 2] == pytest.approx(np.zeros(3), abs=1e-9)
+
+
+def test_every_joint_turns_as_far_as_asked(made) -> None:
+    d, parts = made
+    swing = assemble(d.mesh.scaled(parts.scale_mm_per_unit), parts).figures.swing
+    assert swing.blocked == 0
+    assert min(swing.inward_degrees, swing.outward_degrees) >= swing.wanted_degrees - 1e-6

@@ -9,6 +9,7 @@ from drkid.measure import bend_radians
 from drkid.mesh import Bools, Floats, Ints, TriMesh, read_only
 from drkid.parts.bevel import SHARPEST_JOINT_DEGREES
 from drkid.parts.pocket import leaning_turn
+from drkid.parts.prismoid import RIDGED
 from drkid.rigid_fit import rigid_fit
 from drkid.solid import Solid
 
@@ -52,13 +53,16 @@ def demanded(
 
 
 def far_inside(mesh_mm: TriMesh, shape: MergedClass, piece: MergedPiece) -> Floats:
-    """(n,): how far the mesh's edge lies inside each side of the shape, at its farther end."""
+    """(n,): how far the mesh's edge lies inside each side of the shape, at its farther end; 0 where it lies outside.
+
+    Hinges turn about the shape's side and not about the edge: an edge outside leaves the bevels no less to do.
+    """
     corners = mesh_mm.vertices[list(piece.vertices)]
     motion = rigid_fit(corners, shape.corners)
     corners = corners @ motion[:3, :3].T + motion[:3, 3]
     inward = outline_frames(shape)[:, :3, 1]
     ends = np.stack([corners - shape.corners, np.roll(corners - shape.corners, -1, axis=0)])
-    return np.einsum("esk,sk->es", ends, inward).max(axis=0)
+    return np.einsum("esk,sk->es", ends, inward).max(axis=0, initial=0.0)
 
 
 def shared(lengths: list[Floats], shape: MergedClass) -> Floats:
@@ -137,10 +141,17 @@ def _mitre_planes(shape: MergedClass, face: int) -> list[tuple[Floats, float]]:
 
 
 def bevel_planes(shape: MergedClass, insets_mm: Floats, thickness_mm: float) -> tuple[Floats, Floats, Ints]:
-    """Unit normals (p, 3), levels (p,) and sides (p,): the piece lies where normal·p is more than each level."""
+    """Unit normals (p, 3), levels (p,) and sides (p,): the piece lies where normal·p is more than each level.
+
+    A piece bends beyond the faces of the triangle at a side: where the bevel has a ridge, planes through the hinge axis
+    and its insets at the faces keep what lies there within the swing.
+    """
     frames, found = outline_frames(shape), list[tuple[Floats, Floats]]()
-    heights = np.linspace(-thickness_mm / 2, thickness_mm / 2, len(insets_mm))
-    for (low, below), (high, above) in pairwise(zip(heights.tolist(), insets_mm, strict=True)):
+    half, axis = thickness_mm / 2, np.zeros(len(frames))
+    steps = list(pairwise(zip(np.linspace(-half, half, len(insets_mm)).tolist(), insets_mm, strict=True)))
+    if len(insets_mm) == RIDGED:
+        steps += [((-half, insets_mm[0]), (0.0, axis)), ((0.0, axis), (half, insets_mm[-1]))]
+    for (low, below), (high, above) in steps:
         slope = (above - below) / (high - low)
         normals = frames[:, :3, 1] - slope[:, None] * frames[:, :3, 2]
         levels = np.einsum("sk,sk->s", normals, frames[:, :3, 3]) + below - slope * low

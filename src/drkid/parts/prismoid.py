@@ -10,6 +10,8 @@ from drkid.class_triangle import following, inward_normals
 from drkid.mesh import Floats, read_only
 from drkid.solid import Solid
 
+RIDGED = 3  # outlines, or insets of a side: at both faces and between
+
 
 @dataclass(frozen=True, eq=False)
 class Prismoid:
@@ -27,6 +29,11 @@ class Prismoid:
     def faces(self) -> Floats:
         """(2, 3, 2): the inner and the outer face."""
         return self.outlines[[0, -1]]
+
+    @property
+    def is_ridged(self) -> bool:
+        """Whether its bevels have a ridge along the middle plane."""
+        return len(self.outlines) == RIDGED
 
     @property
     def levels_mm(self) -> Floats:
