@@ -2,9 +2,9 @@
 
 The hinge axes stay on the chords, the sides of the class triangle: the boundary curve leaves them by its sagitta, and
 two pieces still turn about one straight line. Above the flat piece's outer face its bevels are carried on in planes
-through the chords: what keeps flat pieces apart at every bend, the swing with it, keeps curved ones apart too. The outer face
-lies half the thickness over the patch, and all of a kit's by one lift more, where a patch dips so far under its
-triangle that a pocket would lose its roof. A curved piece therefore finds room where the flat one does; where its
+through the chords: what keeps flat pieces apart at every bend, the swing with it, keeps curved ones apart too. The
+outer face lies half the thickness over the patch, and all of a kit's by one lift more, where a patch dips so far under
+its triangle that a pocket would lose its roof. A curved piece therefore finds room where the flat one does; where its
 outer face does not, its patch is flattened.
 """
 
