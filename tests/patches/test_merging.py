@@ -48,6 +48,18 @@ def test_stars_are_disjoint_whole_or_convex_parts(pebble, size) -> None:
         assert piece.widest_angle(pebble) <= WIDEST
 
 
+@pytest.mark.parametrize("size", [5, 6, 7])
+@pytest.mark.parametrize("seed", range(3))
+def test_three_pieces_at_least_meet_in_every_corner(seed, size) -> None:
+    """Two that met on both sides of a corner would have two hinges, and could turn about neither."""
+    ball = icosahedron()
+    mesh = ball.moved(ball.vertices * (1 + 0.1 * np.random.default_rng(seed).standard_normal((12, 1))))
+    groups = starred(mesh, size, 0.01)
+    meeting = Counter(v for group in groups for v in outlined(mesh, group).vertices)
+    assert min(meeting.values()) >= 3
+    assert len(groups) <= 8
+
+
 def test_an_icosahedron_merges_into_one_shape() -> None:
     for merge, pieces in ((2, 10), (5, 8)):
         found = merged_patches(one_class(icosahedron()), KitSpec(merge=merge, merge_shift_percent=5), 1e-6)
