@@ -5,6 +5,7 @@ neighbours may still meet. Both are cut by parallel planes on either side of the
 """
 
 from collections import defaultdict
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -20,6 +21,7 @@ ROUNDS = 4  # a cut for one pair of members is made on all of a shape, which sel
 NOTHING_MM3 = 1e-9
 MOST_OF_PIECE = 0.02  # of a piece's volume: what more is shared is no tip, and left to the figures of the assembly
 ALONG_FACE = 0.7  # cosine of the angle between the normals of a face and of a plane that runs along it
+SAME_PLANE = 6  # decimals to which unit normals of one plane agree
 AROUND_MM = 1.0  # beyond what is shared: how far a cut reaches that would take more than a tip
 
 
@@ -30,6 +32,17 @@ class _Tipped:
     solid: Solid
     room: Solid
     motion: Floats
+
+    def behind(self, shared: Solid, normal: Floats, level: float) -> tuple[Solid, bool]:
+        """What takes away what a plane has behind it of the piece, and whether that is a tip and goes whole.
+
+        More than a tip stays, but for what is near.
+        """
+        behind = self.solid.beyond(-normal, -level)
+        tip = Solid.union([part for part in behind.components() if not (part & shared).is_empty])
+        whole = tip.volume < MOST_OF_PIECE * self.solid.volume
+        bounds = tip.bounds if whole and not tip.is_empty else shared.bounds
+        return Solid.box(*(bounds + np.array([[-AROUND_MM], [AROUND_MM]]))).beyond(-normal, -level), whole
 
     def lost(self, cut: Solid) -> tuple[float, float]:
         """How much a cut takes of the room, in mm³, and which share of the piece."""
@@ -70,15 +83,15 @@ def tips_cut(
         for a, b in pairs:
             own, other = pieces[a].class_index, pieces[b].class_index
             first, second = solids[own].moved(motions[a]), solids[other].moved(motions[b])
-            shared = first & second
-            if not NOTHING_MM3 < shared.volume < MOST_OF_PIECE * min(first.volume, second.volume):
-                continue
-            middle = shared.bounds.mean(axis=0)
-            near = [_nearest(pieces[k], mesh_mm, middle) for k in (a, b)]
             pair = _Tipped(first, room[own], motions[a]), _Tipped(second, room[other], motions[b])
-            one, two = _least(pair, shared, _ways(mesh_mm, near, shared), half_mm)
-            cuts[own].append(one.moved(back[a]))
-            cuts[other].append(two.moved(back[b]))
+            for shared in (first & second).components():
+                if not NOTHING_MM3 < shared.volume < MOST_OF_PIECE * min(first.volume, second.volume):
+                    continue
+                middle = shared.bounds.mean(axis=0)
+                near = [_nearest(pieces[k], mesh_mm, middle) for k in (a, b)]
+                one, two = _least(pair, shared, _ways(mesh_mm, near, shared), half_mm)
+                cuts[own].append(one.moved(back[a]))
+                cuts[other].append(two.moved(back[b]))
         if not cuts:
             break
         for own, cutters in cuts.items():
@@ -87,51 +100,51 @@ def tips_cut(
     return solids
 
 
-def _ways(mesh_mm: TriMesh, faces: list[int], shared: Solid) -> list[Floats]:
-    """Unit normals (3,) of planes that may part two pieces, the second behind, `faces` being those next to the plane.
+def _ways(mesh_mm: TriMesh, faces: list[int], shared: Solid) -> Iterator[Floats]:
+    """Unit normals (n, 3) of planes that may part two pieces, the second behind, `faces` being those next to the plane.
 
-    Half-way between the faces, upright on them or not, and across what the pieces share where it is longest, shorter
-    and shortest; but none that runs along a face, and would leave something thin of it.
+    First those half-way between the faces, upright on them or not, and across what the pieces share where it is
+    longest, shorter and shortest; then those along what bounds that, the sides of the pieces. None runs along a face,
+    and would leave something thin of it.
     """
-    middle, points = shared.bounds.mean(axis=0), shared.mesh().vertices
+    middle, mesh = shared.bounds.mean(axis=0), shared.mesh()
     normals = mesh_mm.face_normals[faces]
     first, second = ((way / np.linalg.norm(way)) for way in mesh_mm.middles[faces] - middle)
     away, up = first - second, normals.sum(axis=0)
     upright = away - (away @ up) / (up @ up) * up
-    axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2]
-    turned = [axis if axis @ away > 0 else -axis for axis in axes]
-    ways = [way / np.linalg.norm(way) for way in (upright, away, *turned)]
-    return [way for way in ways if np.abs(normals @ way).max() < ALONG_FACE] or ways[:1]
+    axes = np.linalg.svd(mesh.vertices - mesh.vertices.mean(axis=0), full_matrices=False)[2]
+    sides = np.unique(np.round(mesh.face_normals[mesh.areas > 0], SAME_PLANE), axis=0)
+    for ways in (np.vstack([upright, away, axes]), sides):
+        unit = ways / np.linalg.norm(ways, axis=1, keepdims=True) * np.where(ways @ away > 0, 1, -1)[:, None]
+        yield unit[np.abs(unit @ normals.T).max(axis=1) < ALONG_FACE]
+    yield upright[None] / np.linalg.norm(upright)
 
 
-def _least(pair: tuple[_Tipped, _Tipped], shared: Solid, ways: list[Floats], half_mm: float) -> list[Solid]:
+def _least(pair: tuple[_Tipped, _Tipped], shared: Solid, ways: Iterable[Floats], half_mm: float) -> list[Solid]:
     """What to cut off either of two pieces, by planes that leave their pockets a wall and take the least of them.
 
-    Where planes on either side of the middle leave no wall, one piece gives way to the other.
+    Planes lie on either side of the middle, or one piece gives way to the other. Tips that go whole are taken before
+    others; later ways are tried where there are none of the former that do.
     """
-    middle, best, least = shared.bounds.mean(axis=0), list[Solid](), (np.inf, np.inf)
+    middle, best, least = shared.bounds.mean(axis=0), list[Solid](), (np.inf, np.inf, np.inf)
     points = shared.mesh().vertices - middle
-    for normal in ways:
-        along = points @ normal
-        for level in (0.0, float(along.min()), float(along.max())):
-            at = float(middle @ normal) + level
-            found = [
-                _behind(one.solid, shared, sign * normal, sign * at + half_mm)
-                for sign, one in zip((1, -1), pair, strict=True)
-            ]
-            lost = [one.lost(cut) for one, cut in zip(pair, found, strict=True)]
-            cost = max(missing for missing, _ in lost), max(share for _, share in lost)
-            if cost < least:
-                best, least = found, cost
+    for some in ways:
+        for normal in some:
+            along = points @ normal
+            for level in (0.0, float(along.min()) - half_mm, float(along.max()) + half_mm):
+                at = float(middle @ normal) + level
+                cuts = [one.behind(shared, k * normal, k * at + half_mm) for k, one in zip((1, -1), pair, strict=True)]
+                lost = [one.lost(cut) for one, (cut, _) in zip(pair, cuts, strict=True)]
+                cost = (
+                    sum(room for room, _ in lost),
+                    sum(not whole for _, whole in cuts),
+                    max(share for _, share in lost),
+                )
+                if cost < least:
+                    best, least = [cut for cut, _ in cuts], cost
+        if least[:2] == (0, 0):
+            break
     return best
-
-
-def _behind(solid: Solid, shared: Solid, normal: Floats, level: float) -> Solid:
-    """What takes the tip of a solid behind a plane away; only what is near where that is more than a tip."""
-    behind = solid.beyond(-normal, -level)
-    tip = Solid.union([part for part in behind.components() if not (part & shared).is_empty])
-    bounds = tip.bounds if 0 < tip.volume < MOST_OF_PIECE * solid.volume else shared.bounds
-    return Solid.box(*(bounds + np.array([[-AROUND_MM], [AROUND_MM]]))).beyond(-normal, -level)
 
 
 def _reflection(corners: Floats, image: tuple[int, ...]) -> Floats:

@@ -61,7 +61,7 @@ def _fans(mesh: TriMesh) -> list[tuple[int, ...]]:
 def _apart(mesh: TriMesh, fans: list[tuple[int, ...]], free: Bools, valence: int, tolerance: float) -> list[int]:
     """Vertices of a valence whose stars are free and share no face: fewest rivals first, then frequent shapes."""
     open_ = [v for v, fan in enumerate(fans) if len(fan) == valence and free[list(fan)].all()]
-    open_ = [v for v in open_ if outlined(mesh, fans[v]).widest_angle(mesh) <= WIDEST]
+    open_ = [v for v in open_ if outlined(mesh, fans[v]).makes_a_piece(mesh)]
     if not open_:
         return []
     stands = shapes(residuals(mesh, [outlined(mesh, fans[v]) for v in open_])[0], tolerance)
@@ -98,7 +98,7 @@ def _longest_run(
                 run.append(f)
             if (
                 len(run) > max(len(best), 1)
-                and outlined(mesh, tuple(run)).widest_angle(mesh) <= WIDEST
+                and outlined(mesh, tuple(run)).makes_a_piece(mesh)
                 and _meets_two(mesh, fans, owner, tuple(run))
             ):
                 best = tuple(run)
