@@ -41,7 +41,7 @@ def printed_width_mm(solid: Solid) -> float:
 def test_a_dome_gets_a_foot_to_print_on() -> None:
     shell = dome()
     assert printed_width_mm(shell) > 2 * LONGEST_MM
-    footed, depth = with_foot(shell, NOTHING, THICKNESS_MM, WALL_MM, LONGEST_MM, achiral=False)
+    footed, depth = with_foot(shell, NOTHING, THICKNESS_MM, WALL_MM, LONGEST_MM)
     assert printed_width_mm(footed) <= LONGEST_MM
     assert 0 < depth <= 0.16 * THICKNESS_MM
     assert 0 < (shell - footed).volume < 0.01 * shell.volume
@@ -50,7 +50,7 @@ def test_a_dome_gets_a_foot_to_print_on() -> None:
 
 def test_a_piece_that_is_its_own_mirror_image_stays_so() -> None:
     shell = dome()
-    footed, depth = with_foot(shell, NOTHING, THICKNESS_MM, WALL_MM, LONGEST_MM, achiral=True)
+    footed, depth = with_foot(shell, NOTHING, THICKNESS_MM, WALL_MM, LONGEST_MM, np.diag([-1.0, 1.0, 1.0, 1.0]))
     assert depth > 0
     assert (footed - footed.mirrored()).volume == pytest.approx(0.0, abs=1e-3)
     assert printed_width_mm(footed) <= LONGEST_MM
@@ -58,16 +58,16 @@ def test_a_piece_that_is_its_own_mirror_image_stays_so() -> None:
 
 def test_the_cut_leaves_a_wall_before_what_is_kept() -> None:
     shell = dome()
-    free, _ = with_foot(shell, NOTHING, THICKNESS_MM, WALL_MM, LONGEST_MM, achiral=False)
+    free, _ = with_foot(shell, NOTHING, THICKNESS_MM, WALL_MM, LONGEST_MM)
     cut = (shell - free).mesh().vertices.mean(axis=0)  # amid what that foot took away
-    kept, depth = with_foot(shell, cut[None], THICKNESS_MM, WALL_MM, LONGEST_MM, achiral=False)
+    kept, depth = with_foot(shell, cut[None], THICKNESS_MM, WALL_MM, LONGEST_MM)
     assert depth > 0
     assert np.linalg.norm((shell - kept).mesh().vertices - cut, axis=1).min() >= WALL_MM - 1e-6
 
 
 def test_what_prints_as_it_is_stays_as_it_is() -> None:
     slab = Solid.box([0, 0, 0], [30, 30, 6])
-    footed, depth = with_foot(slab, NOTHING, THICKNESS_MM, WALL_MM, LONGEST_MM, achiral=True)
+    footed, depth = with_foot(slab, NOTHING, THICKNESS_MM, WALL_MM, LONGEST_MM)
     assert footed is slab
     assert depth == 0
 
@@ -75,7 +75,7 @@ def test_what_prints_as_it_is_stays_as_it_is() -> None:
 def test_what_no_foot_helps_stays_as_it_is() -> None:
     """A closed room: its ceiling hangs whichever way it lies, but for ways in which none is wider than its bridge."""
     room = Solid.box([-20, -20, -20], [20, 20, 20]) - Solid.box([-16, -16, -16], [16, 16, 16])
-    footed, depth = with_foot(room, NOTHING, THICKNESS_MM, WALL_MM, 0.0, achiral=False)
+    footed, depth = with_foot(room, NOTHING, THICKNESS_MM, WALL_MM, 0.0)
     assert footed is room
     assert depth == 0
 

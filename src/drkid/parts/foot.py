@@ -30,7 +30,12 @@ class Foot:
 
 
 def with_foot(
-    piece: Solid, kept: Floats, thickness_mm: float, wall_mm: float, longest_bridge_mm: float, achiral: bool
+    piece: Solid,
+    kept: Floats,
+    thickness_mm: float,
+    wall_mm: float,
+    longest_bridge_mm: float,
+    reflection: Floats | None = None,
 ) -> tuple[Solid, float]:
     """A piece that prints without supports, and how deep its foot is cut, in mm: 0 where it needs or finds none.
 
@@ -42,7 +47,7 @@ def with_foot(
         thickness_mm: of the piece: what is cut off is a share of it.
         wall_mm: the thinnest wall.
         longest_bridge_mm: the widest overhang that prints.
-        achiral: whether the piece is its own mirror image, and stays so: the foot is then cut on both sides.
+        reflection: (4, 4), of a piece that is its own mirror image, and stays so: the foot is then cut on both sides.
     """
     mesh = rounded(piece.mesh())
     if _printed_width_mm(mesh, longest_bridge_mm) <= longest_bridge_mm:
@@ -57,7 +62,7 @@ def with_foot(
             walled = (kept @ foot.direction).max(initial=-np.inf) <= foot.level - wall_mm
             if not walled or foot.area_mm2 < least_mm2:
                 continue
-            footed = _cut(piece, foot, achiral)
+            footed = _cut(piece, foot, reflection)
             if _printed_width_mm(rounded(footed.mesh()), longest_bridge_mm) <= longest_bridge_mm:
                 return footed, depth
     return piece, 0.0
@@ -77,11 +82,11 @@ def _feet(piece: Solid, mesh: TriMesh, directions: Floats, depth_mm: float) -> l
     return sorted(found, key=lambda foot: (not foot.stands, -foot.area_mm2))
 
 
-def _cut(piece: Solid, foot: Foot, achiral: bool) -> Solid:
-    mirror = np.array([-1.0, 1.0, 1.0])
-    directions = [foot.direction, foot.direction * mirror] if achiral else [foot.direction]
-    for direction in directions:
-        piece = piece.beyond(-direction, -foot.level)
+def _cut(piece: Solid, foot: Foot, reflection: Floats | None) -> Solid:
+    piece = piece.beyond(-foot.direction, -foot.level)
+    if reflection is not None:
+        direction = reflection[:3, :3] @ foot.direction
+        piece = piece.beyond(-direction, -foot.level - float(direction @ reflection[:3, 3]))
     return piece.without_needles()
 
 

@@ -15,6 +15,7 @@ from drkid.solid import Solid
 
 SKIRT_MM = 1.0  # beyond what stands out of the outline; the bevels cut it away
 OVERLAP_MM = 1e-3  # beyond its folds: how far the bevels of a triangle cut, so that no film is left between two cuts
+OUTWARD = 0.2  # cosine of the angle to a side's way outwards: a line flatter than that runs along the side
 MITRE = 1e-3  # singular values below this share are left out: triangles in one plane have one normal
 
 
@@ -184,10 +185,11 @@ def slab_mesh(shape: MergedClass, skirt_mm: float, thickness_mm: float) -> TriMe
 def _outward(shape: MergedClass) -> Floats:
     """(n, 3): where a corner goes if both of its sides move outwards by 1 at least, each in the plane of its triangle.
 
-    Along the fold where one meets the corner; else half-way between the sides, where several do only nearly in plane.
+    Along the line that the two planes share, which is the fold where one meets the corner; half-way between the sides
+    where there is one plane, or that line does not lead outwards.
     """
     frames, n = outline_frames(shape), len(shape.corners)
-    inward = frames[:, :3, 1]
+    inward, normals = frames[:, :3, 1], _face_normals(shape)[shape.side_face]
     points = np.vstack([shape.corners, shape.inner])
     out = np.empty((n, 3))
     for i in range(n):
@@ -196,6 +198,11 @@ def _outward(shape: MergedClass) -> Floats:
         if len(own) == 2:
             far = next(v for v in np.intersect1d(own[0], own[1]) if v != i)
             direction = points[i] - points[far]
+        elif len(own) > 2:
+            line = np.cross(normals[i - 1], normals[i])
+            line *= 1.0 if line @ direction > 0 else -1.0
+            steep = max(inward[i - 1] @ line, inward[i] @ line) < -OUTWARD * np.linalg.norm(line)
+            direction = line if steep else direction
         out[i] = direction / -max(inward[i - 1] @ direction, inward[i] @ direction)
     return out
 
