@@ -52,15 +52,13 @@ def with_foot(
     mesh = rounded(piece.mesh())
     if _printed_width_mm(mesh, longest_bridge_mm) <= longest_bridge_mm:
         return piece, 0.0
-    directions = sphere_directions(DIRECTIONS)
-    most_cut = _feet(piece, mesh, directions, DEPTHS[-1] * thickness_mm)
     least_mm2 = LEAST_AREA * thickness_mm**2
-    directions = np.array([foot.direction for foot in most_cut if foot.area_mm2 >= least_mm2]).reshape(-1, 3)
-    directions = directions[[_width_mm(mesh, d) <= longest_bridge_mm for d in directions]]
+    directions = _broad(mesh, sphere_directions(DIRECTIONS), DEPTHS[-1] * thickness_mm, thickness_mm)
+    most_cut = _feet(piece, mesh, directions, DEPTHS[-1] * thickness_mm, least_mm2)
+    directions = np.array([f.direction for f in most_cut if _width_mm(mesh, f.direction) <= longest_bridge_mm])
     for depth in (share * thickness_mm for share in DEPTHS):
-        for foot in _feet(piece, mesh, directions, depth):
-            walled = (kept @ foot.direction).max(initial=-np.inf) <= foot.level - wall_mm
-            if not walled or foot.area_mm2 < least_mm2:
+        for foot in _feet(piece, mesh, directions.reshape(-1, 3), depth, least_mm2):
+            if (kept @ foot.direction).max(initial=-np.inf) > foot.level - wall_mm:
                 continue
             footed = _cut(piece, foot, reflection)
             if _printed_width_mm(rounded(footed.mesh()), longest_bridge_mm) <= longest_bridge_mm:
@@ -68,17 +66,27 @@ def with_foot(
     return piece, 0.0
 
 
-def _feet(piece: Solid, mesh: TriMesh, directions: Floats, depth_mm: float) -> list[Foot]:
-    """A foot of one depth in every direction (n, 3): those it stands on by itself first, then the largest."""
-    levels = (mesh.vertices @ directions.T).max(axis=0) - depth_mm
+def _broad(mesh: TriMesh, directions: Floats, depth_mm: float, breadth_mm: float) -> Floats:
+    """Those of the directions (n, 3) in which corners lie within a depth of the farthest, but not beside it."""
+    reach = mesh.vertices @ directions.T
+    farthest = mesh.vertices[reach.argmax(axis=0)]
+    beside = np.linalg.norm(mesh.vertices[:, None] - farthest, axis=2) < breadth_mm
+    return directions[((reach > reach.max(axis=0) - depth_mm) & ~beside).any(axis=0)]
+
+
+def _feet(piece: Solid, mesh: TriMesh, directions: Floats, depth_mm: float, least_mm2: float) -> list[Foot]:
+    """The feet of one depth that are large enough: those it stands on by itself first, then the largest."""
+    levels = (mesh.vertices @ directions.T).max(axis=0, initial=-np.inf) - depth_mm
     centre = _centre_of_mass(mesh)
     found: list[Foot] = []
     for direction, level in zip(directions, levels.tolist(), strict=True):
         cap = piece.beyond(direction, level).mesh()
         bottom = (np.abs(cap.corners @ direction - level) < IN_PLANE_MM).all(axis=1)
-        flat = (cap.corners[bottom].reshape(-1, 3) @ turned_down(direction).T)[:, :2]
-        stands = _inside(flat, (turned_down(direction) @ centre)[:2])
-        found.append(Foot(direction, level, float(cap.areas[bottom].sum()), stands))
+        area = float(cap.areas[bottom].sum())
+        if area >= least_mm2:
+            turn = turned_down(direction)
+            flat = (cap.corners[bottom].reshape(-1, 3) @ turn.T)[:, :2]
+            found.append(Foot(direction, level, area, _inside(flat, (turn @ centre)[:2])))
     return sorted(found, key=lambda foot: (not foot.stands, -foot.area_mm2))
 
 
