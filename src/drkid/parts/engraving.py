@@ -58,11 +58,6 @@ class Ground:
         distance = np.abs(_inside_distance(self.nodes, lines)).reshape(self.room_mm.shape)
         return Ground(self.low, np.minimum(self.room_mm, distance - apart_mm))
 
-    def within(self, outline: Floats, margin_mm: float) -> "Ground":
-        """The ground that is left inside a polygon (n, 2), so far from its sides."""
-        inside = _inside_distance(self.nodes, segments([outline])).reshape(self.room_mm.shape)
-        return Ground(self.low, np.minimum(self.room_mm, inside - margin_mm))
-
 
 def ground(solid: Solid, d: Dimensions, width_mm: float, depth_mm: float, outline: Floats | None = None) -> Ground:
     """Where strokes leave every wall whole; only inside a polygon (n, 2) and as far from it, where one is given.
@@ -84,9 +79,13 @@ def ground(solid: Solid, d: Dimensions, width_mm: float, depth_mm: float, outlin
     low, high = own.min(axis=(0, 1)), own.max(axis=(0, 1))
     empty = Ground(low, np.zeros(np.ceil((high - low) / STEP_MM).astype(int) + 1))
     nodes, margin = empty.nodes, reach_mm(width_mm) + BETWEEN_MM
-    room = np.min([_inside_distance(nodes, section) - wanted[z] - margin for z, section in sections.items()], axis=0)
-    found = Ground(low, room.reshape(empty.room_mm.shape))
-    return found if outline is None else found.within(outline, d.min_wall_mm + margin)
+    room = np.full(len(nodes), np.inf)
+    if outline is not None:
+        room = _inside_distance(nodes, own) - d.min_wall_mm - margin
+    near = room > -2 * STEP_MM  # other nodes have no neighbour with room
+    for z, section in sections.items():
+        room[near] = np.minimum(room[near], _inside_distance(nodes[near], section) - wanted[z] - margin)
+    return Ground(low, room.reshape(empty.room_mm.shape))
 
 
 def segments(loops: Sequence[Floats]) -> Floats:
