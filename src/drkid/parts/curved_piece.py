@@ -17,7 +17,7 @@ from drkid.kit import Dimensions
 from drkid.mesh import Floats, Ints, TriMesh
 from drkid.parts.fit import Margin, inradius
 from drkid.parts.pocket import depth_mm, flare_mm, side_frames
-from drkid.parts.prismoid import Prismoid
+from drkid.parts.prismoid import FROM_AXIS, Prismoid
 from drkid.solid import Solid
 
 FOOTPRINT_POINTS = 9  # in either direction, at which heights over a pocket are taken
@@ -62,7 +62,8 @@ def outer_margin(triangle: Floats, prismoid: Prismoid, patch: CurvedPatch, lift_
     highest = prismoid.thickness_mm / 2 + lift_mm + max(float(patch.points(sides)[:, 2].max()), 0.0)
     outline = prismoid.outline(highest)
     if prismoid.is_ridged:
-        outline = triangle + (prismoid.faces[1] - triangle) * highest / (prismoid.thickness_mm / 2)
+        low = FROM_AXIS * prismoid.thickness_mm / 2
+        outline = triangle + (prismoid.outline(low) - triangle) * highest / low
     return Margin("inscribed radius of the curved face", wall_mm, inradius(triangle, outline))
 
 
@@ -82,8 +83,8 @@ def curved_solid(triangle: Floats, patch: CurvedPatch, prismoid: Prismoid, lift_
 def _side_planes(triangle: Floats, prismoid: Prismoid) -> tuple[Floats, Floats]:
     """Outward normals (n, 3) and offsets (n,): the planes normal·p + offset = 0 of all but the two faces.
 
-    With those through the hinge axes and the outer face's sides, where bevels have ridges: their own planes leave the
-    axes by the ridge, and would take ever more of the swing above that face.
+    With those through the hinge axes, where bevels have ridges: their own planes leave the axes by the ridge, and would
+    take ever more of the swing above the outer face.
     """
     equations = np.asarray(ConvexHull(prismoid.points).equations, np.float64)
     equations = equations[np.abs(equations[:, 2]) < 1 - UPRIGHT]
@@ -92,7 +93,8 @@ def _side_planes(triangle: Floats, prismoid: Prismoid) -> tuple[Floats, Floats]:
     if not prismoid.is_ridged:
         return equations[first, :3], equations[first, 3]
     along = following(triangle) - triangle
-    up = np.column_stack([prismoid.faces[1] - triangle, np.full(3, prismoid.thickness_mm / 2)])
+    low = FROM_AXIS * prismoid.thickness_mm / 2
+    up = np.column_stack([prismoid.outline(low) - triangle, np.full(3, low)])
     outward = np.cross(np.column_stack([along, np.zeros(3)]), up)
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
     offset = -(outward[:, :2] * triangle).sum(axis=1)

@@ -9,7 +9,7 @@ from drkid.measure import bend_radians
 from drkid.mesh import Bools, Floats, Ints, TriMesh, read_only
 from drkid.parts.bevel import SHARPEST_JOINT_DEGREES
 from drkid.parts.pocket import leaning_turn
-from drkid.parts.prismoid import RIDGED
+from drkid.parts.prismoid import FROM_AXIS, RIDGED
 from drkid.rigid_fit import rigid_fit
 from drkid.solid import Solid
 
@@ -145,13 +145,14 @@ def bevel_planes(shape: MergedClass, insets_mm: Floats, thickness_mm: float) -> 
     """Unit normals (p, 3), levels (p,) and sides (p,): the piece lies where normal·p is more than each level.
 
     A piece bends beyond the faces of the triangle at a side: where the bevel has a ridge, planes through the hinge axis
-    and its insets at the faces keep what lies there within the swing.
+    keep what lies there within the swing.
     """
     frames, found = outline_frames(shape), list[tuple[Floats, Floats]]()
     half, axis = thickness_mm / 2, np.zeros(len(frames))
     steps = list(pairwise(zip(np.linspace(-half, half, len(insets_mm)).tolist(), insets_mm, strict=True)))
     if len(insets_mm) == RIDGED:
-        steps += [((-half, insets_mm[0]), (0.0, axis)), ((0.0, axis), (half, insets_mm[-1]))]
+        near = (1 - FROM_AXIS) * insets_mm[1] + FROM_AXIS * insets_mm
+        steps += [((-FROM_AXIS * half, near[0]), (0.0, axis)), ((0.0, axis), (FROM_AXIS * half, near[-1]))]
     for (low, below), (high, above) in steps:
         slope = (above - below) / (high - low)
         normals = frames[:, :3, 1] - slope[:, None] * frames[:, :3, 2]

@@ -11,6 +11,8 @@ from drkid.mesh import Floats, read_only
 from drkid.solid import Solid
 
 RIDGED = 3  # outlines, or insets of a side: at both faces and between
+FROM_AXIS = 0.9  # of half the thickness: from there on bevels with a ridge go on in planes through the hinge axes; from
+# the faces on, three planes would meet in one line
 
 
 @dataclass(frozen=True, eq=False)
