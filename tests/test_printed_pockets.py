@@ -8,7 +8,7 @@ from drkid.assembly.structure import Shape
 from drkid.mesh import rounded
 from drkid.parts import make_parts
 from drkid.parts.pocket import pocket
-from drkid.printed_pockets import PocketRoom, pocket_figures
+from drkid.printed_pockets import PocketRoom, pocket_figures, wall_between_pockets_mm
 from drkid.solid import Solid
 from drkid.spec import KitSpec
 
@@ -52,6 +52,18 @@ def test_a_pocket_of_another_draft_is_named(drafted, room) -> None:
     found = figures(shapes, drafted, room)
     assert found.volume_share > 1e-3
     assert f"{drafted.parts[1].name} {drafted.parts[1].handedness} side 3" in found.between
+
+
+def test_the_wall_between_two_pockets_is_measured(drafted, room) -> None:
+    """Between plain boxes as deep and as far apart as the connectors' spaces are."""
+    shape, connectors = shapes_of(drafted)[0], [one.solid for one in drafted.connectors]
+    assert wall_between_pockets_mm(shape, connectors, room) > room.wall_mm
+    beside = shape.side_frames[[0, 0, 2]].copy()
+    width = 2 * (max(float(np.abs(one.bounds[:, 0]).max()) for one in connectors) + room.clearance_mm)
+    beside[1, :3, 3] += (width + room.wall_mm / 3) * beside[1, :3, 0]
+    solid = shape.solid - pocket(drafted.dimensions).moved(beside[1])
+    near = wall_between_pockets_mm(replace(shape, side_frames=beside, solid=solid), connectors, room)
+    assert near == pytest.approx(room.wall_mm / 3, abs=1e-3)
 
 
 def test_pockets_within_one_anothers_walls_are_counted_and_left_out(drafted, room) -> None:

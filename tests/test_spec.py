@@ -74,7 +74,6 @@ from drkid.spec import MOST_WALKED_FACES, PRINTERS, PROCESSES, UNIVERSAL, UNIVER
         ({"documents": "some"}, ["documents", "some"]),
         ({"merge": 2, "patch": "curved"}, ["patch is curved", "merge is 2", "give one"]),
         ({"merge": 2, "bevel_variants": 2}, ["bevel_variants is 2", "merge is 2", "bevels of its own"]),
-        ({"merge": 6, "mark_depth_mm": 0.4}, ["mark_depth_mm is 0.4", "merge is 6"]),
         ({"curved_classes": 4}, ["curved_classes is given", "--patch curved"]),
         ({"curved": "published"}, ["curved is given", "--patch curved"]),
         ({"merge": 2, "subdivision_levels": 2}, ["subdivision_levels is given", "--patch curved"]),

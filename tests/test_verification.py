@@ -13,7 +13,7 @@ from drkid.export.layout import part_label
 from drkid.export.ply import ply_bytes
 from drkid.export.stl import stl_bytes
 from drkid.export.three_mf import PlateObject, three_mf_bytes
-from drkid.kit import BRIDGE, Finding
+from drkid.kit import BRIDGE, WALL, Finding
 from drkid.mesh import TriMesh, rounded
 from drkid.parts.pocket import pocket
 from drkid.solid import Solid
@@ -193,6 +193,21 @@ def test_one_pocket_that_is_wider_than_the_others_is_found(copy, kit):
 def test_pockets_that_are_too_tight_for_the_stated_clearance_are_found(copy):
     edit(copy, lambda document: document["spec"].update(clearance_mm=0.3))
     assert "clearance of the pockets" in failures(copy)
+
+
+def test_a_wall_that_is_too_thin_is_found_unless_it_is_told(copy, kit):
+    part = kit.part_set.parts[0]
+    low, high = part.solid.bounds
+    middle, wall = part.corners.mean(axis=0), kit.part_set.dimensions.min_wall_mm / 2
+    groove = Solid.box([*middle[:2] - 1, low[2] - 1], [*middle[:2] + 1, high[2] - wall])
+    (copy / part_name(part)).write_bytes(stl_bytes(rounded((part.solid - groove).mesh())))
+    found = {check.name: check for check in verify_kit(copy).checks if not check.passed}
+    assert set(found) == {"walls of the parts"}
+    assert f"{part_label(part_name(part))}: {wall:.2f} mm is not told" in found["walls of the parts"].detail
+    name = f"class {part.name}" if part.handedness == "any" else f"class {part.name} ({part.handedness})"
+    thin = Finding(name, WALL, 2 * wall, wall, "mm", "at least")
+    edit(copy, lambda document: document["findings"].append(asdict(thin)))
+    assert not failures(copy)
 
 
 def plate_of(slab: Solid, name: str, lift_mm: float = 0.0) -> bytes:

@@ -14,8 +14,9 @@ from drkid.kit import Source, Surface
 from drkid.mesh import TriMesh
 from drkid.pipeline import make_kit, read_surface
 from drkid.remesh import simplify
+from drkid.solid import Solid
 from drkid.spec import KitSpec
-from drkid.wall_thickness import even_edge, faces_that_resolve, require_walls, wall_thickness
+from drkid.wall_thickness import even_edge, faces_that_resolve, require_walls, thinnest_wall_mm, wall_thickness
 
 
 @cache
@@ -114,3 +115,37 @@ def test_the_sheet_is_refused_with_the_faces_that_would_resolve_it(shared_data):
     mesh = read_surface(shared_data / "er_thin_sheet.mrc.gz", KitSpec(smooth=False)).mesh
     with pytest.raises(InputError, match=r"too thin for 172 pieces.*found: 9\d % .*faces"):
         require_walls(mesh, 172)
+
+
+def block() -> Solid:
+    return Solid.box((0, 0, 0), (30, 20, 6))
+
+
+@pytest.mark.parametrize(
+    ("boxes", "thinnest"),
+    [
+        ([((5, 5, 1), (9, 9, 7))], 1.0),
+        ([((5, -1, -1), (6, 19, 7)), ((7, 1, -1), (8, 21, 7))], 1.0),
+        ([((0.7, 5, 5), (40, 9, 7))], 0.7),
+    ],
+    ids=["floor", "between", "a millimetre high"],
+)
+def test_the_thinnest_wall_of_a_part_is_found_wherever_it_is(boxes, thinnest):
+    mesh = block().minus_all([Solid.box(*box) for box in boxes]).mesh()
+    assert thinnest_wall_mm(mesh) == pytest.approx(thinnest, abs=1e-4)
+
+
+def test_an_edge_is_no_wall():
+    wedge = Solid.hull([(0, 0, 0), (0, 0, 9), (12, 0, 0), (0, 30, 0), (0, 30, 9), (12, 30, 0)])
+    assert thinnest_wall_mm(wedge.mesh()) == pytest.approx(30.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.3])
+def test_ribs_between_strokes_are_no_walls_where_they_are_no_higher_than_marks_are_deep(tilt):
+    turn = np.eye(4)
+    turn[1:3, 1:3] = [[np.cos(tilt), -np.sin(tilt)], [np.sin(tilt), np.cos(tilt)]]
+    strokes = [Solid.box((x, 5, 5.6), (x + 0.8, 15, 7)) for x in (5, 6.2)]
+    mesh = block().minus_all(strokes).moved(turn).mesh()
+    assert thinnest_wall_mm(mesh) == pytest.approx(0.4, abs=1e-4)
+    assert thinnest_wall_mm(mesh, rib_mm=0.3) == pytest.approx(0.4, abs=1e-4)
+    assert thinnest_wall_mm(mesh, rib_mm=0.4) == pytest.approx(5.6, abs=1e-4)

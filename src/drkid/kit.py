@@ -21,6 +21,7 @@ Firmness = Literal["stiff", "soft", "may snap through"]
 Verdict = Literal["closes", "closes with strain", "does not close"]
 
 BRIDGE = "widest bridge, as it lies on its plate"  # what a finding of it is about
+WALL = "thinnest wall"  # the same
 FINDING_TOLERANCE = 1e-6  # mm or degrees: what rounding may take from a dimension
 
 

@@ -14,6 +14,7 @@ STEEPEST_DEGREES = 45.0  # from the vertical: what leans out more needs support 
 AS_STEEP = 1e-4  # of a normal: the flanks of a detent lean by 45° to single precision
 ON_BED_MM = 0.02
 SAME_DIRECTION = 1e-3
+DECIMALS = 6  # of a facet's plane: the triangles of one facet have it to this
 WIDTH_STEP_MM = 0.5  # bridges that differ by less are as good as each other
 
 
@@ -25,7 +26,7 @@ def print_orientation(mesh: TriMesh, longest_bridge_mm: float = inf) -> Floats:
     then the one with most of it on the bed.
     """
     normals, areas = _resting_facets(mesh)
-    turns = [_turned_down(normal) for normal in normals]
+    turns = [turned_down(normal) for normal in normals]
     return min(zip(turns, areas, strict=True), key=lambda pair: _preference(mesh, *pair, longest_bridge_mm))[0]
 
 
@@ -36,6 +37,24 @@ def widest_bridge_mm(mesh: TriMesh) -> float:
     not lie on the bed.
     """
     return max((_circle_mm(mesh, patch) for patch in _free_patches(mesh)), default=0.0)
+
+
+def free_width_mm(mesh: TriMesh) -> float:
+    """How wide at most a part's free patches are as it lies, across a side of their hulls: no bridge is wider."""
+    return max((_least_width(mesh.corners[p].reshape(-1, 3)[:, :2]) for p in _free_patches(mesh)), default=0.0)
+
+
+def turned_down(normal: Floats) -> Floats:
+    """The rotation that takes a direction to −z by the shortest way; half a turn about x where it is +z."""
+    x, y, z = normal
+    if z > 1 - SAME_DIRECTION**2:
+        return np.diag([1.0, -1.0, -1.0])
+    if z < -1 + SAME_DIRECTION**2:
+        return np.eye(3)
+    axis = np.array([-y, x, 0.0]) / np.hypot(x, y)  # normal × (−z) turned into the plane
+    cosine, sine = -z, np.hypot(x, y)
+    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    return np.eye(3) + sine * cross + (1 - cosine) * cross @ cross
 
 
 def _preference(
@@ -61,49 +80,28 @@ def _circle_mm(mesh: TriMesh, patch: Ints) -> float:
 
 
 def _free_patches(mesh: TriMesh) -> list[Ints]:
-    """The faces of each patch, connected along edges, that leans out by more than 45° and does not lie on the bed."""
+    """The faces of each patch, connected, that leans out by more than 45° and does not lie on the bed."""
     leaning = mesh.face_normals[:, 2] < -np.cos(np.radians(STEEPEST_DEGREES)) - AS_STEEP
     free = np.flatnonzero(leaning & (mesh.corners[:, :, 2].max(axis=1) > mesh.vertices[:, 2].min() + ON_BED_MM))
-    if not len(free):
-        return []
-    faces = mesh.faces[free]
-    edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1), axis=-1).reshape(-1, 2)
-    _, edge = np.unique(edges, axis=0, return_inverse=True)
-    count = int(edge.max()) + 1
-    touching = coo_array(
-        (np.ones(len(edge)), (np.repeat(np.arange(len(free)), 3), edge.ravel())), shape=(len(free), count)
-    )
-    label = connected_components((touching @ touching.T).tocsr(), directed=False)[1]
+    first, second, third = mesh.faces[free].T
+    count = len(mesh.vertices)
+    links = coo_array((np.ones(2 * len(free)), (np.tile(first, 2), np.r_[second, third])), shape=(count, count))
+    label = connected_components(links.tocsr(), directed=False)[1][first]
     return [free[label == k] for k in np.unique(label)]
 
 
 def _resting_facets(mesh: TriMesh) -> tuple[Floats, Floats]:
     """Outward normals (n, 3) of the hull's facets that the part itself lies in, and the area it rests on (n,)."""
-    hull = ConvexHull(mesh.vertices)
-    found, areas = list[Floats](), list[float]()
-    for normal, offset in zip(hull.equations[:, :3], hull.equations[:, 3], strict=True):
-        if any(normal @ other > 1 - SAME_DIRECTION for other in found):
-            continue
-        level = (mesh.corners @ normal + offset > -ON_BED_MM).all(axis=1)
-        if level.any():
-            found.append(np.asarray(normal, np.float64))
-            areas.append(float(mesh.areas[level].sum()))
-    most = max(areas)
-    chosen = [k for k, area in enumerate(areas) if area > most / 20]  # it stands on no sliver
-    return np.array([found[k] for k in chosen]), np.array([areas[k] for k in chosen])
-
-
-def _turned_down(normal: Floats) -> Floats:
-    """The rotation that takes a direction to −z by the shortest way; half a turn about x where it is +z."""
-    x, y, z = normal
-    if z > 1 - SAME_DIRECTION**2:
-        return np.diag([1.0, -1.0, -1.0])
-    if z < -1 + SAME_DIRECTION**2:
-        return np.eye(3)
-    axis = np.array([-y, x, 0.0]) / np.hypot(x, y)  # normal × (−z) turned into the plane
-    cosine, sine = -z, np.hypot(x, y)
-    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    return np.eye(3) + sine * cross + (1 - cosine) * cross @ cross
+    equations = np.unique(np.round(ConvexHull(mesh.vertices).equations, DECIMALS), axis=0)
+    level = (mesh.corners @ equations[:, :3].T + equations[:, 3] > -ON_BED_MM).all(axis=1)  # (F, n)
+    areas = mesh.areas @ level
+    chosen = list[int]()
+    for k in np.argsort(-areas, kind="stable").tolist():
+        if areas[k] <= areas.max() / 20:  # it stands on no sliver
+            break
+        if all(equations[k, :3] @ equations[other, :3] <= 1 - SAME_DIRECTION for other in chosen):
+            chosen.append(k)
+    return equations[chosen, :3], areas[chosen]
 
 
 def _least_width(points: Floats) -> float:

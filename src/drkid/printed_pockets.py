@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from math import radians, tan
 
 import numpy as np
@@ -99,6 +100,14 @@ def pocket_figures(
         between=(sides[int(np.argmax([max(found) for found in apart]))].name, model.name),
         clearance_mm=float(least),
     )
+
+
+def wall_between_pockets_mm(shape: Shape, connectors: Sequence[Solid], room: PocketRoom) -> float:
+    """The least wall between the spaces of two connectors of a piece; twice what is wanted where it is more."""
+    most, hull = 2 * room.wall_mm, Solid.hull(shape.solid.mesh().vertices)
+    held, _ = _boxes(connectors, room)
+    spaces = [(hull & held.moved(frame)) - shape.solid for frame in shape.side_frames]
+    return min([most, *(one.gap(other, most) for one, other in combinations(spaces, 2))])
 
 
 def _boxes(connectors: Sequence[Solid], room: PocketRoom) -> tuple[Solid, Solid]:

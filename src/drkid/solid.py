@@ -76,6 +76,11 @@ class Solid:
             raise ValueError(message)
         return cls(body)
 
+    @classmethod
+    def union(cls, solids: Iterable["Solid"]) -> Self:
+        """The union of solids; nothing where there are none."""
+        return cls(manifold3d.Manifold.batch_boolean([one.body for one in solids], manifold3d.OpType.Add))
+
     # ---- combined
 
     def __add__(self, other: "Solid") -> "Solid":
@@ -94,6 +99,10 @@ class Solid:
         """Difference with every one of `others`, in one operation."""
         bodies = [self.body, *(o.body for o in others)]
         return Solid(manifold3d.Manifold.batch_boolean(bodies, manifold3d.OpType.Subtract))
+
+    def components(self) -> "list[Solid]":
+        """Its parts that do not hang together."""
+        return [Solid(body) for body in self.body.decompose()]
 
     def moved(self, matrix: Floats) -> "Solid":
         """Carried by a 4×4 matrix, column-vector convention."""

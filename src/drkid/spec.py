@@ -271,7 +271,12 @@ class KitSpec(BaseModel):
     )
     min_wall_mm: float | None = _field(None, "Pieces", "Thinnest wall of a piece.", gt=0)
     knuckle_wall_mm: float | None = _field(None, "Pieces", "Wall of the hinge around its rod.", gt=0)
-    mark_depth_mm: float | None = _field(None, "Pieces", "Depth of engraved marks.", ge=0)
+    mark_depth_mm: float | None = _field(
+        None,
+        "Pieces",
+        "Depth of engraved marks; when not given the process's, and none on curved and merged pieces.",
+        ge=0,
+    )
     swing_degrees: float = _field(
         5.5, "Pieces", "Swing that every joint keeps to either side, so that it can be assembled.", ge=0, le=30
     )
@@ -289,7 +294,7 @@ class KitSpec(BaseModel):
     retention: Retention = _field(
         "detent", "Pieces", "What holds a hinge in its pocket: detent (a bump that springs into a groove), or glue."
     )
-    marks: bool = _field(True, "Pieces", "Engrave class letter and side ticks on the inner face.")
+    marks: bool = _field(True, "Pieces", "Engrave class letter and side ticks, or numbers, on the inner face.")
     process_values: ProcessPreset | None = _field(
         None, "Pieces", "What the process can do where it is a user's own: written to kit.json, read from --process."
     )
@@ -404,8 +409,8 @@ class KitSpec(BaseModel):
 
     @property
     def engraving_depth_mm(self) -> float:
-        """How deep marks are: merged pieces bear none, curved ones only where a depth is given."""
-        if self.merge is not None or (self.patch == "curved" and self.mark_depth_mm is None):
+        """How deep marks are: curved and merged pieces bear them only where a depth is given."""
+        if self.mark_depth_mm is None and (self.merge is not None or self.patch == "curved"):
             return 0.0
         return self.preset.mark_depth_mm if self.mark_depth_mm is None else self.mark_depth_mm
 
@@ -575,8 +580,6 @@ def _merge_contradiction(spec: KitSpec) -> str:
             f"bevel_variants is {spec.bevel_variants} and merge is {spec.merge}: every merged shape has bevels of its "
             "own already; a lesser --merge-tolerance-mm makes more shapes"
         )
-    if spec.mark_depth_mm:
-        return f"mark_depth_mm is {spec.mark_depth_mm:g} and merge is {spec.merge}: no one plane is inside to engrave"
     return ""
 
 

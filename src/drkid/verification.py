@@ -14,16 +14,17 @@ from drkid.export.document import FindingDocument
 from drkid.export.layout import ASSEMBLED, BOM_CSV, BOM_JSON, PIECE_CLASS, SIMPLIFIED, SURFACE, part_label
 from drkid.export.read_back import broken_file, read_document, read_mesh
 from drkid.intersection import self_intersections
-from drkid.kit import BRIDGE, Building, Closure, Overlapping, Swing
+from drkid.kit import BRIDGE, WALL, Building, Closure, Overlapping, Swing
 from drkid.measure import bend_radians, dihedral
 from drkid.mesh import Floats, Ints, TriMesh
 from drkid.metrics import surface_distances
 from drkid.printed import structure_of
 from drkid.printed_plates import lying
-from drkid.printed_pockets import PocketRoom, pocket_figures
+from drkid.printed_pockets import PocketRoom, pocket_figures, wall_between_pockets_mm
 from drkid.process import ProcessPreset
 from drkid.solid import Solid
 from drkid.spec import KitSpec
+from drkid.wall_thickness import thinnest_wall_mm
 
 RELATIVE = 1e-6  # of a recomputed length: PLY and JSON keep full double precision
 DISTANCE_PERCENT = 0.02  # of the diagonal: what two samplings of a surface may differ by
@@ -33,6 +34,7 @@ PRINTED_MM = 1e-4  # between corners and stated lengths: single precision in the
 ASSEMBLED_MM, ASSEMBLED_SHARE = 1e-3, 0.01  # what a relaxation that is begun from rounded figures may differ by
 SWING_DEGREES = 0.1  # a corner in single precision, seen from an axis a fraction of a mm away
 POCKET_SHARE = 1e-4  # of a pocket's volume: by how much two may differ, in volume or shape
+FACET_MM = 0.02  # what facets of round shapes may take from a wall
 CLEARANCE_MM = 1e-3  # what the facets of round connectors may take from a clearance
 SINGULAR_VALUE = 1e-6  # of the rigidity matrix: below it is rounding, a square root of it
 
@@ -297,6 +299,7 @@ def _together(folder: Path, mesh: TriMesh, kit: KitDocument) -> list[Check]:
     last = structure.insertion(float(kit.spec["thickness_mm"]), order[-1:])
     return [
         *_pockets(structure, kit),
+        _walls(structure, kit),
         _closes(closure, kit),
         *_closure(closure, kit),
         _swings(swing, kit),
@@ -312,11 +315,9 @@ def _pockets(structure: Structure, kit: KitDocument) -> list[Check]:
     """
     if not structure.connectors or kit.metrics.curved is not None:
         return []
-    clearance, wall, thickness = (float(kit.spec[f"{name}_mm"]) for name in ("clearance", "min_wall", "thickness"))
-    names = [part_label(part.file) for one in kit.classes for part in one.parts]
-    room = PocketRoom(clearance, wall, thickness, _preset(kit).draft_degrees, kit.metrics.merged is not None)
+    room, clearance = _room(kit), float(kit.spec["clearance_mm"])
     try:
-        found = pocket_figures(structure.shapes, names, structure.connectors, room)
+        found = pocket_figures(structure.shapes, _part_names(kit), structure.connectors, room)
     except ValueError as error:
         return [Check("pockets are alike", passed=False, detail=str(error))]
     crowded = f", but {found.crowded} with another within their walls" if found.crowded else ""
@@ -330,6 +331,38 @@ def _pockets(structure: Structure, kit: KitDocument) -> list[Check]:
         Check("pockets are alike", alike, told),
         Check("clearance of the pockets", abs(found.clearance_mm - clearance) <= CLEARANCE_MM, least),
     ]
+
+
+def _room(kit: KitDocument) -> PocketRoom:
+    clearance, wall, thickness = (float(kit.spec[f"{name}_mm"]) for name in ("clearance", "min_wall", "thickness"))
+    return PocketRoom(clearance, wall, thickness, _preset(kit).draft_degrees, kit.metrics.merged is not None)
+
+
+def _part_names(kit: KitDocument) -> list[str]:
+    return [part_label(part.file) for one in kit.classes for part in one.parts]
+
+
+def _walls(structure: Structure, kit: KitDocument) -> Check:
+    """No wall is thinner than the process makes it, or than a finding says of its part."""
+    room, depth, knuckle = _room(kit), float(kit.spec["mark_depth_mm"]), float(kit.spec["knuckle_wall_mm"])
+    told = {_part_of(finding): finding.available for finding in kit.findings if finding.what == WALL}
+    found, wanted = dict[str, float](), dict[str, float]()
+    for name, shape in zip(_part_names(kit), structure.shapes, strict=True):
+        wanted[name] = min(room.wall_mm, told.get(name, np.inf))
+        found[name] = thinnest_wall_mm(shape.solid.mesh(), depth)
+        if structure.connectors:
+            found[name] = min(found[name], wall_between_pockets_mm(shape, structure.connectors, room))
+    for number, solid in enumerate(structure.connectors):
+        name = f"connector {number + 1}"
+        found[name], wanted[name] = thinnest_wall_mm(solid.mesh()), min(room.wall_mm, knuckle)
+    bad = "; ".join(f"{n}: {w:.2f} mm is not told" for n, w in found.items() if w < wanted[n] - FACET_MM)
+    thinnest = min(found, key=found.__getitem__)
+    return Check("walls of the parts", not bad, bad or f"thinnest {found[thinnest]:.2f} mm, of {thinnest}")
+
+
+def _part_of(finding: FindingDocument) -> str:
+    """The part that a finding is of, as parts are labelled."""
+    return finding.subject.removeprefix("class ").replace("(", "").replace(")", "")
 
 
 def _closes(closure: Closure, kit: KitDocument) -> Check:
@@ -407,7 +440,7 @@ def _plates(folder: Path, kit: KitDocument) -> list[Check]:
     if not found:
         return []
     worst, preset = max(found, key=lambda one: one.bridge_mm), _preset(kit)
-    told = {f.subject.removeprefix("class ").replace("(", "").replace(")", "") for f in kit.findings if _is_too_wide(f)}
+    told = {_part_of(finding) for finding in kit.findings if _is_too_wide(finding)}
     limit = np.inf if preset.longest_bridge_mm is None else preset.longest_bridge_mm + CLEARANCE_MM
     untold = [one for one in found if one.bridge_mm > limit and one.name.replace("_", " ") not in told]
     bad = "; ".join(f"{one.name}: {one.bridge_mm:.2f} mm is not told" for one in untold)

@@ -11,7 +11,7 @@ import igl
 import numpy as np
 
 from drkid.errors import InputError
-from drkid.mesh import Floats, TriMesh
+from drkid.mesh import Bools, Floats, Ints, TriMesh
 
 FACING_COSINE = -0.5  # of the angle between a wall's two sides: 120 degrees at least
 LIFT_DIAGONALS = 1e-6  # rays start this much below the surface, so that they do not hit their own face
@@ -19,17 +19,70 @@ SHEET_EDGES = 0.35  # a wall thinner than this times the mean edge has no inside
 SHEET_SHARE = 0.5  # of the area on such walls, from which the simplified mesh would fold and collapse
 THIN_EDGES, THIN_SHARE = 0.7, 0.15  # from here on the user should hear of it
 MOST_SENSIBLE = 3000  # faces: nobody builds more
+ALONGSIDE_COSINE = -math.cos(math.radians(20))  # of the angle between the sides of a part's wall; else it is an edge
+STEP_MM = 2.0  # between the rays through a part's walls
+SLIVER_MM = 0.05  # faces of a part that are narrower are none of a wall's sides
+UPRIGHT_COSINE = math.sin(math.radians(20))  # between a rib's sides and the plane that it stands under
+RIB_MM = 0.01  # what rounding adds to a rib's height
+MOST_STEPS = 64  # of rays along a face's longest side
 
 
 def wall_thickness(mesh: TriMesh) -> Floats:
     """(F,): from the middle of every face straight inwards to a wall that faces it; infinite where none does."""
+    return _inwards(mesh, mesh.corners.mean(axis=1), np.arange(len(mesh.faces)), FACING_COSINE)
+
+
+def _inwards(mesh: TriMesh, points: Floats, face: Ints, facing_cosine: float) -> Floats:
+    """(n,): from points (n, 3) on faces (n,) straight inwards to a face that looks the other way, or infinite."""
     tree: Any = igl.AABB()
     tree.init(np.array(mesh.vertices), np.array(mesh.faces))
-    lift = LIFT_DIAGONALS * mesh.diagonal
-    start = mesh.corners.mean(axis=1) - lift * mesh.face_normals
-    hit, beyond, _ = tree.intersect_ray_first(mesh.vertices, mesh.faces, start, -mesh.face_normals)
-    facing = np.einsum("ij,ij->i", mesh.face_normals, mesh.face_normals[hit]) < FACING_COSINE
+    lift, normals = LIFT_DIAGONALS * mesh.diagonal, mesh.face_normals[face]
+    hit, beyond, _ = tree.intersect_ray_first(mesh.vertices, mesh.faces, points - lift * normals, -normals)
+    facing = np.einsum("ij,ij->i", normals, mesh.face_normals[hit]) < facing_cosine
     return np.where((hit >= 0) & facing, np.asarray(beyond) + lift, np.inf)
+
+
+def thinnest_wall_mm(mesh: TriMesh, rib_mm: float = 0.0) -> float:
+    """The thinnest wall of a printed part, between two sides that are parallel within 20°; infinite where none is.
+
+    By rays from points some `STEP_MM` apart on all faces that are no slivers. Ribs that stand no higher than `rib_mm`
+    under a plane of the surface, as there are between the strokes of marks so deep, are no walls.
+    """
+    faces = np.flatnonzero(2 * mesh.areas > SLIVER_MM * mesh.side_lengths.max(axis=1))
+    steps = np.clip(np.ceil(mesh.side_lengths[faces].max(axis=1) / STEP_MM), 1, MOST_STEPS).astype(np.int64)
+    points, owner = list[Floats](), list[Ints]()
+    for count in np.unique(steps).tolist():
+        own = faces[steps == count]
+        points.append(np.einsum("nk,fkc->fnc", _middles(count), mesh.corners[own]).reshape(-1, 3))
+        owner.append(np.repeat(own, count**2))
+    start, face = np.concatenate(points), np.concatenate(owner)
+    found = _inwards(mesh, start, face, ALONGSIDE_COSINE)
+    walls = np.isfinite(found)
+    start, face, found = start[walls], face[walls], found[walls]
+    if rib_mm:
+        found[_on_ribs(mesh, faces, start, start - mesh.face_normals[face] * found[:, None], rib_mm)] = np.inf
+    return float(found.min(initial=np.inf))
+
+
+def _on_ribs(mesh: TriMesh, faces: Ints, start: Floats, end: Floats, rib_mm: float) -> Bools:
+    """(n,): which walls from `start` to `end` (n, 3) lie within `rib_mm` under the plane of a face that they meet."""
+    levels = np.einsum("fk,fk->f", mesh.face_normals, mesh.corners[:, 0])
+    planes = np.unique(np.round(np.column_stack([mesh.face_normals, levels])[faces], 3), axis=0)
+    out, along = np.zeros(len(start), np.bool_), end - start
+    length = np.linalg.norm(along, axis=1)
+    for normal, level in zip(planes[:, :3], planes[:, 3].tolist(), strict=True):
+        under = level - np.stack([start, end]) @ normal
+        near = ((under > -RIB_MM) & (under < rib_mm + RIB_MM)).all(axis=0)
+        out |= near & (np.abs(along @ normal) < UPRIGHT_COSINE * length)
+    return out
+
+
+def _middles(count: int) -> Floats:
+    """(count², 3): barycentric coordinates of the middles of a triangle's parts, its sides cut in `count`."""
+    i, j = np.divmod(np.arange(count**2), count)
+    lower = i + j < count
+    a, b = np.where(lower, i + 1 / 3, count - i - 1 / 3), np.where(lower, j + 1 / 3, count - j - 1 / 3)
+    return np.stack([a, b, count - a - b], axis=1) / count
 
 
 def even_edge(area: float, faces: int) -> float:

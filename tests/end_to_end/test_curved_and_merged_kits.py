@@ -14,7 +14,7 @@ COMMON = {"faces": 60, "method": "pressure", "classes": 2, "tolerance_percent": 
 
 @pytest.fixture(scope="module", params=["curved", "merged"])
 def written(request, potato_file, tmp_path_factory):
-    kind = {"patch": "curved", "curved_classes": 3} if request.param == "curved" else {"merge": 2}
+    kind = {"patch": "curved", "curved_classes": 3} if request.param == "curved" else {"merge": 2, "mark_depth_mm": 0.4}
     kit = make_kit(potato_file, KitSpec(**COMMON, **kind))
     return kit, kit.write(tmp_path_factory.mktemp("kits") / request.param)
 

@@ -105,3 +105,27 @@ def test_curved_shell_is_as_thick_as_stated_along_its_normal(levels, flattened) 
     assert top == pytest.approx(highest + thickness / 2, abs=flattened * thickness)
     assert levels < 3 or highest == pytest.approx(middle[2], abs=0.02 * thickness)
     assert patch.points(np.eye(3))[:, 2] == pytest.approx(np.zeros(3), abs=1e-9)
+
+
+def test_every_joint_turns_as_far_as_asked(made) -> None:
+    d, parts = made
+    swing = assemble(d.mesh.scaled(parts.scale_mm_per_unit), parts).figures.swing
+    assert swing.blocked == 0
+    assert min(swing.inward_degrees, swing.outward_degrees) >= swing.wanted_degrees - 1e-6
+
+
+def test_merged_pieces_bear_marks_only_where_a_depth_is_given() -> None:
+    d = decomposed(icosahedron())
+    patches = make_patches(d, sphere_like(d.mesh), SPECS["pairs"])
+    plain = make_parts(d, SPECS["pairs"], patches=patches)
+    marked = make_parts(d, KitSpec(merge=2, mark_depth_mm=0.4), patches=patches)
+    assert [note for note in plain.notes if "Merged pieces bear no marks" in note and "--mark-depth-mm" in note]
+    assert not [note for note in marked.notes if "marks" in note]
+    assert [f.available for f in marked.findings if f.subject == "marks"] == [0.4]
+    assert not [f for f in plain.findings if f.subject == "marks"]
+    for before, after in zip(plain.parts, marked.parts, strict=True):
+        assert after.solid.volume < before.solid.volume
+    for off in (KitSpec(merge=2, mark_depth_mm=0.0), KitSpec(merge=2, mark_depth_mm=0.4, marks=False)):
+        bare = make_parts(d, off, patches=patches)
+        assert [p.solid.volume for p in bare.parts] == [p.solid.volume for p in plain.parts]
+        assert not [note for note in bare.notes if "marks" in note]

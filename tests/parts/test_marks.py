@@ -3,7 +3,8 @@ import pytest
 from exact_shapes import decomposed, potato, sixths
 
 from drkid.parts import make_parts
-from drkid.parts.marks import _engraving, marks, side_ranks
+from drkid.parts.engraving import engraving
+from drkid.parts.marks import marks, side_ranks
 from drkid.solid import Solid
 from drkid.spec import KitSpec
 
@@ -27,7 +28,7 @@ def test_marks_keep_the_wall_to_pockets_and_bevels_at_the_smallest_size(connecto
     for part in kit.parts:
         found = marks(part, d, width, depth)
         low = -d.thickness_mm / 2
-        cut = _engraving(np.concatenate([found.letter, found.ticks]), width, low, low + depth)
+        cut = engraving(np.concatenate([found.letter, found.ticks]), width, low, low + depth)
         assert not cut.is_empty
         assert (cut - part.solid).volume < 1e-9
         nearest = min(nearest, (all_round - part.solid).gap(cut, 5.0))

@@ -8,9 +8,11 @@ from drkid.kit import Decomposition, Outcome
 from drkid.mesh import TriMesh
 from drkid.patches.matching import paired
 from drkid.patches.merging import merged_patches
-from drkid.patches.outline import WIDEST, outlined
+from drkid.patches.outline import SHARPEST_FOLD, outlined
 from drkid.patches.vertex_star import starred
 from drkid.spec import KitSpec
+
+TETRAHEDRON = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
 
 
 def icosahedron() -> TriMesh:
@@ -45,7 +47,37 @@ def test_stars_are_disjoint_whole_or_convex_parts(pebble, size) -> None:
         common = set.intersection(*(set(pebble.faces[f].tolist()) for f in group))
         assert common, "all triangles of a star meet at its middle"
         assert len(piece.inner) == (1 if len(group) == pebble.valence[min(common)] and len(group) > 2 else 0)
-        assert piece.widest_angle(pebble) <= WIDEST
+        assert piece.makes_a_piece(pebble)
+
+
+@pytest.mark.parametrize("merge", [2, 4, 6])
+def test_no_piece_is_folded_by_more_than_a_right_angle(merge) -> None:
+    """Of a double pyramid so flat that its rim is sharper; a tetrahedron, all of whose edges are, stays as it is."""
+    around = np.linspace(0, 2 * np.pi, 7)[:-1]
+    rim = np.column_stack([np.cos(around), np.sin(around), np.zeros(6)])
+    mesh = TriMesh(
+        np.vstack([rim, [[0, 0, 0.3], [0, 0, -0.3]]]),
+        np.array([f for i in range(6) for f in ((i, (i + 1) % 6, 6), ((i + 1) % 6, i, 7))]),
+    )
+    groups = paired(mesh, 0.01) if merge == 2 else starred(mesh, merge, 0.01)
+    folds = [outlined(mesh, group).sharpest_fold(mesh) for group in groups]
+    assert max(map(len, groups)) > 1
+    assert max(folds) <= SHARPEST_FOLD
+    tetrahedron = TriMesh(np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]), TETRAHEDRON)
+    alone = paired(tetrahedron, 0.01) if merge == 2 else starred(tetrahedron, merge, 0.01)
+    assert sorted(alone) == [(0,), (1,), (2,), (3,)]
+
+
+@pytest.mark.parametrize("size", [5, 6, 7])
+@pytest.mark.parametrize("seed", range(3))
+def test_three_pieces_at_least_meet_in_every_corner(seed, size) -> None:
+    """Two that met on both sides of a corner would have two hinges, and could turn about neither."""
+    ball = icosahedron()
+    mesh = ball.moved(ball.vertices * (1 + 0.1 * np.random.default_rng(seed).standard_normal((12, 1))))
+    groups = starred(mesh, size, 0.01)
+    meeting = Counter(v for group in groups for v in outlined(mesh, group).vertices)
+    assert min(meeting.values()) >= 3
+    assert len(groups) <= 8
 
 
 def test_an_icosahedron_merges_into_one_shape() -> None:

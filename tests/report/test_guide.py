@@ -8,7 +8,7 @@ import pytest
 from pypdf import PdfReader
 
 from drkid.report.building_picture import Builder
-from drkid.report.guide import STEPS_A_PICTURE, Guide, ranks
+from drkid.report.guide import STEPS_A_PICTURE, Guide, ranks, tick_word
 
 
 @pytest.fixture(scope="module")
@@ -30,14 +30,15 @@ def test_each_step_joins_all_neighbours_that_stand(guide, scene):
 
 def test_sides_that_meet_are_about_as_long_as_their_ticks_say(guide, scene):
     lengths = [
-        dict(zip(t, c.edge_lengths, strict=True)) for t, c in zip(guide.ticks, scene.document.classes, strict=True)
+        dict(zip(map(tick_word, t), c.edge_lengths, strict=True))
+        for t, c in zip(guide.ticks, scene.document.classes, strict=True)
     ]
     longest = max(c.edge_lengths[-1] for c in scene.document.classes)
     piece_of = {int(step): i for i, step in enumerate(scene.piece_step)}
     for one in guide.instructions:
         for join in one.joins:
-            own = lengths[scene.piece_class[one.piece]][join.ticks]
-            other = lengths[scene.piece_class[piece_of[join.other_step]]][join.other_ticks]
+            own = lengths[scene.piece_class[one.piece]][join.side]
+            other = lengths[scene.piece_class[piece_of[join.other_step]]][join.other_side]
             assert abs(own - other) < 0.12 * longest  # two errors of 5 % of the mean edge
 
 

@@ -25,8 +25,9 @@ from drkid.measure import bend_radians
 from drkid.mesh import Ints, TriMesh, read_only
 from drkid.progress import Progress, silent
 from drkid.rigid_fit import rigid_fit
-from drkid.spec import KitSpec
+from drkid.spec import ConnectorKind, KitSpec
 
+RIGID: ConnectorKind = "box"  # nothing turns about a key
 PLAIN = KitSpec()
 
 
@@ -116,8 +117,8 @@ def _proven(
         AssemblyFigures(closure, swing, building, overlap),
         (
             *_closure_notes(closure),
-            *_swing_notes(swing),
-            *_overlap_notes(overlap),
+            *_swing_notes(swing, structure.connector),
+            *_overlap_notes(overlap, structure.connector),
             *_building_notes(building, structure.faces[last.piece]),
         ),
     )
@@ -144,22 +145,22 @@ def _closure_notes(closure: Closure) -> Iterator[str]:
         )
 
 
-def _swing_notes(swing: Swing) -> Iterator[str]:
-    if swing.blocked:
+def _swing_notes(swing: Swing, connector: ConnectorKind) -> Iterator[str]:
+    if swing.blocked and connector != RIGID:
         yield (
             f"{swing.blocked} joints cannot turn by {swing.wanted_degrees:g}° both ways; the tightest has "
             f"{min(swing.inward_degrees, swing.outward_degrees):.1f}°."
         )
 
 
-def _overlap_notes(overlap: Overlapping) -> Iterator[str]:
+def _overlap_notes(overlap: Overlapping, connector: ConnectorKind) -> Iterator[str]:
     if overlap.faces is not None:
         a, b = overlap.faces
         yield (
             f"{overlap.pairs} pairs of pieces reach into one another, most of all those of faces {a} and {b}, by "
             f"{overlap.largest_mm3:.2g} mm³ ({overlap.largest_percent:.2g} % of the smaller)."
         )
-    if overlap.swung:
+    if overlap.swung and connector != RIGID:
         yield (
             f"{overlap.swung} pairs of pieces meet, by {overlap.swung_mm3:.2g} mm³ at most, when one of them turns by "
             f"{overlap.swing_degrees:g}° about a hinge."

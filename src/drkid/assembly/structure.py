@@ -76,6 +76,19 @@ class Structure:
         ends = np.array([[self.targets[p][i], self.targets[p][(i + 1) % len(self.targets[p])]] for p, i in both])
         return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
 
+    @cached_property
+    def lean_radians(self) -> float:
+        """How far the connectors' frames lean inwards from their pieces: a key's do, by half of its bend.
+
+        At a joint that bends by δ they are 180° − δ − 2·lean apart; told by the flatter half of the joints.
+        """
+        if self.connector != "box":
+            return 0.0
+        inwards = (self.placements[self.graph.pieces] @ self.framework.frames)[..., :3, 1]
+        apart = np.arccos(np.clip(np.einsum("jk,jk->j", inwards[:, 0], inwards[:, 1]), -1, 1))
+        flat = np.argsort(np.abs(self.bend_radians))[: (len(apart) + 1) // 2]
+        return float(np.median((np.pi - self.bend_radians - apart)[flat])) / 2
+
     def joining(self) -> Joining:
         """The virtual assembly."""
         first = np.cumsum([0, *(len(shape.corners) for shape in self.shapes)])
@@ -84,11 +97,18 @@ class Structure:
         return joined(self.framework, corners, tuple(self.targets), np.asarray(self.faces), moulds, self.play)
 
     def swinging(self, wanted_degrees: float) -> Swing:
-        """How far the hinges turn."""
+        """How far the hinges turn, or would, where a key holds them."""
+        upright = np.eye(4)
+        cosine, sine = np.cos(self.lean_radians), np.sin(self.lean_radians)
+        upright[1:3, 1:3] = [[cosine, -sine], [sine, cosine]]
         reach = [
-            np.array([sectors(shape.beside(side).mesh().vertices, shape.side_frames[side]) for side in range(count)])
+            np.array(
+                [
+                    sectors(shape.beside(side).mesh().vertices, frame @ upright)
+                    for side, frame in enumerate(shape.side_frames)
+                ]
+            )
             for shape in self.shapes
-            for count in (len(shape.corners),)
         ]
         return swing(self.framework, self.parts, self.graph.sides, reach, wanted_degrees)[0]
 

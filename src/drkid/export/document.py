@@ -1,5 +1,6 @@
 """kit.json, version 1: the document as pydantic models, from which its JSON Schema comes."""
 
+from math import dist
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -43,6 +44,11 @@ class PartDocument(Model):
     count: int = Field(ge=1)
     corners: list[Point] = Field(description="in the part frame, counter-clockwise from outside")
     sides: list[SideDocument]
+
+    @property
+    def side_lengths(self) -> list[float]:
+        """Of the sides in the order of the corners at which they start."""
+        return [dist(a, b) for a, b in zip(self.corners, [*self.corners[1:], self.corners[0]], strict=True)]
 
 
 class ClassDocument(Model):
@@ -356,3 +362,8 @@ class KitDocument(Model):
     notes: list[str] = Field(default=[], description="what a user should know about this kit")
     findings: list[FindingDocument] = Field(default=[], description="dimensions against what the process needs")
     patches: list[PatchDocument] | None = Field(default=None, description="of curved kits: one for each class")
+
+    @property
+    def is_merged(self) -> bool:
+        """Whether its pieces are merged of several faces."""
+        return any(piece.faces is not None for piece in self.pieces)

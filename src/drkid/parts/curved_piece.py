@@ -1,23 +1,23 @@
 """Curved piece: a curved outer face over the flat inner face, the bevels and the pockets of a flat piece.
 
 The hinge axes stay on the chords, the sides of the class triangle: the boundary curve leaves them by its sagitta, and
-two pieces still turn about one straight line. The planes of the flat piece's bevels, which run through the chords, are
-carried on to the curved face: what keeps flat pieces apart at every bend keeps curved ones apart too. The outer face
-lies half the thickness over the patch, and all of a kit's by one lift more, where a patch dips so far under its
-triangle that a pocket would lose its roof. A curved piece therefore finds room where the flat one does; where its
+two pieces still turn about one straight line. Above the flat piece's outer face its bevels are carried on in planes
+through the chords: what keeps flat pieces apart at every bend, the swing with it, keeps curved ones apart too. The
+outer face lies half the thickness over the patch, and all of a kit's by one lift more, where a patch dips so far under
+its triangle that a pocket would lose its roof. A curved piece therefore finds room where the flat one does; where its
 outer face does not, its patch is flattened.
 """
 
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from drkid.class_triangle import inward_normals, symmetries
+from drkid.class_triangle import following, inward_normals, symmetries
 from drkid.curved_patch import CurvedPatch, barycentric_grid, gradients
 from drkid.kit import Dimensions
 from drkid.mesh import Floats, Ints, TriMesh
 from drkid.parts.fit import Margin, inradius
 from drkid.parts.pocket import depth_mm, flare_mm, side_frames
-from drkid.parts.prismoid import Prismoid
+from drkid.parts.prismoid import FROM_AXIS, Prismoid
 from drkid.solid import Solid
 
 FOOTPRINT_POINTS = 9  # in either direction, at which heights over a pocket are taken
@@ -73,12 +73,16 @@ def outer_margin(triangle: Floats, prismoid: Prismoid, patch: CurvedPatch, lift_
     """What the bevels leave of the outer face where its sides stand highest."""
     sides = np.concatenate([barycentric_grid(3).points[side] for side in barycentric_grid(3).sides])
     highest = prismoid.thickness_mm / 2 + lift_mm + max(float(patch.points(sides)[:, 2].max()), 0.0)
-    return Margin("inscribed radius of the curved face", wall_mm, inradius(triangle, prismoid.outline(highest)))
+    outline = prismoid.outline(highest)
+    if prismoid.is_ridged:
+        low = FROM_AXIS * prismoid.thickness_mm / 2
+        outline = triangle + (prismoid.outline(low) - triangle) * highest / low
+    return Margin("inscribed radius of the curved face", wall_mm, inradius(triangle, outline))
 
 
 def curved_solid(triangle: Floats, patch: CurvedPatch, prismoid: Prismoid, lift_mm: float, levels: int) -> Solid:
     """The piece before its pockets are cut: what is under the outer face, cut by the flat piece's planes."""
-    normals, offsets = _side_planes(prismoid)
+    normals, offsets = _side_planes(triangle, prismoid)
     half = prismoid.thickness_mm / 2
     top = half + lift_mm + max(float(patch.points(barycentric_grid(levels).points)[:, 2].max()), 0.0)
     outline = np.concatenate([prismoid.outline(height) for height in (-half, 0.0, half, top)])
@@ -89,13 +93,25 @@ def curved_solid(triangle: Floats, patch: CurvedPatch, prismoid: Prismoid, lift_
     return solid
 
 
-def _side_planes(prismoid: Prismoid) -> tuple[Floats, Floats]:
-    """Outward normals (n, 3) and offsets (n,): the planes normal·p + offset = 0 of all but the two faces."""
+def _side_planes(triangle: Floats, prismoid: Prismoid) -> tuple[Floats, Floats]:
+    """Outward normals (n, 3) and offsets (n,): the planes normal·p + offset = 0 of all but the two faces.
+
+    With those through the hinge axes, where bevels have ridges: their own planes leave the axes by the ridge, and would
+    take ever more of the swing above the outer face.
+    """
     equations = np.asarray(ConvexHull(prismoid.points).equations, np.float64)
     equations = equations[np.abs(equations[:, 2]) < 1 - UPRIGHT]
     apart = np.abs(equations[:, None] - equations[None]).max(axis=2) > SAME_PLANE
     first = [i for i in range(len(equations)) if apart[i, :i].all()]
-    return equations[first, :3], equations[first, 3]
+    if not prismoid.is_ridged:
+        return equations[first, :3], equations[first, 3]
+    along = following(triangle) - triangle
+    low = FROM_AXIS * prismoid.thickness_mm / 2
+    up = np.column_stack([prismoid.outline(low) - triangle, np.full(3, low)])
+    outward = np.cross(np.column_stack([along, np.zeros(3)]), up)
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    offset = -(outward[:, :2] * triangle).sum(axis=1)
+    return np.vstack([equations[first, :3], outward]), np.concatenate([equations[first, 3], offset])
 
 
 def block_mesh(

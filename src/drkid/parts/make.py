@@ -11,7 +11,7 @@ import numpy as np
 from drkid.class_triangle import LEFT_CORNERS, is_mirror_symmetric, laid_down, printed_lengths, symmetrised
 from drkid.curved_patch import CurvedPatch
 from drkid.errors import FitError
-from drkid.kit import Connector, Decomposition, Dimensions, Handedness, Part, PartSet, Patches
+from drkid.kit import Connector, Decomposition, Dimensions, Handedness, MergedClass, Part, PartSet, Patches
 from drkid.mesh import Floats, Ints, read_only
 from drkid.parts.bevel import require_bends
 from drkid.parts.bevel_variants import Moulds, moulds
@@ -26,7 +26,8 @@ from drkid.parts.key import box_key
 from drkid.parts.make_merged import merged_parts
 from drkid.parts.marks import marked
 from drkid.parts.members import Members
-from drkid.parts.notes import connector_notes, corner_notes, groove_notes, notes
+from drkid.parts.merged_marks import merged_marked
+from drkid.parts.notes import connector_notes, corner_notes, groove_notes, notes, room_notes
 from drkid.parts.pocket import pocket, side_frames
 from drkid.parts.prismoid import Prismoid
 from drkid.parts.process_findings import bridge_findings, findings
@@ -52,7 +53,7 @@ def make_parts(
     `spec.bevel_variants` of each. An equilateral piece is laid down in the way that narrows its bevels.
     The scale is the decomposition's own where given edge lengths fix it. Else it makes the longest side of the mesh's
     bounding box `spec.size_mm`, or is the smallest at which all pockets and walls fit, rounded up to whole mm of that
-    side. The inner face of each is marked, if it is flat. With curved `patches` the decomposition is theirs, and the
+    side. The inner face of each is marked. With curved `patches` the decomposition is theirs, and the
     size that of flat pieces: patches are flattened where their outer faces find no room at it. With merged ones it is
     that of the triangles.
 
@@ -105,7 +106,7 @@ def make_parts(
     )
     if merged is not None:
         part_set = merged_parts(merged, part_set, spec, tuple(connector_notes(members, design.dimensions)))
-    part_set = _marked(part_set, spec)
+    part_set = _marked(part_set, spec, () if merged is None else merged.merged)
     bridges = bridge_findings(part_set.parts, part_set.connectors, spec)
     part_set = replace(part_set, findings=(*part_set.findings, *bridges))
     for part in part_set.parts:
@@ -324,29 +325,33 @@ def _mirrored(right: Part, dimensions: Dimensions) -> Part:
     return Part(right.class_index, "left", _flat(triangle), frames, right.solid.mirrored(), right.class_name)
 
 
-def _marked(part_set: PartSet, spec: KitSpec) -> PartSet:
-    """The parts with their marks, and a note for each that has no room for one."""
-    depth = spec.engraving_depth_mm
+def _marked(part_set: PartSet, spec: KitSpec, shapes: tuple[MergedClass, ...]) -> PartSet:
+    """The parts with their marks, and what has no room for them; `shapes` are those of merged pieces."""
+    depth, width, d = spec.engraving_depth_mm, spec.preset.engrave_width_mm, part_set.dimensions
     if not spec.marks or spec.mark_depth_mm == 0:
         return part_set
     if depth == 0:
         return replace(part_set, notes=(*part_set.notes, *_unmarked(spec)))
-    made, notes_ = list[Part](), list[str]()
-    for part in part_set.parts:
-        found, missing = marked(part, part_set.dimensions, spec.preset.engrave_width_mm, depth)
-        made.append(found)
-        hand = "" if part.handedness == "any" else f" ({part.handedness})"
-        if missing:
-            notes_.append(f"Class {part.name}{hand}: no room for the {', '.join(missing)} inside.")
-    return replace(part_set, parts=tuple(made), notes=(*part_set.notes, *notes_))
+    if shapes:
+        scale = part_set.scale_mm_per_unit
+        found = [
+            merged_marked(part, replace(shape, corners=part.corners, inner=shape.inner * scale), d, width, depth)
+            for part, shape in zip(part_set.parts, shapes, strict=True)
+        ]
+    else:
+        found = [marked(part, d, width, depth) for part in part_set.parts]
+    return replace(
+        part_set,
+        parts=tuple(part for part, _ in found),
+        notes=(*part_set.notes, *room_notes([(part, missing) for part, missing in found if missing])),
+    )
 
 
 def _unmarked(spec: KitSpec) -> Iterator[str]:
     """Why pieces that a process could mark bear no marks."""
-    if spec.merge is not None:
-        yield "Merged pieces have no one plane inside, and bear no marks."
-    elif spec.patch == "curved":
-        yield "Curved pieces bear no marks, because the ribs between strokes are thinner than a wall: --mark-depth-mm."
+    kind = "Merged" if spec.merge is not None else "Curved" if spec.patch == "curved" else ""
+    if kind:
+        yield f"{kind} pieces bear no marks, because the ribs between strokes are thinner than a wall: --mark-depth-mm."
 
 
 def _flat(triangle: Floats) -> Floats:

@@ -5,12 +5,14 @@ from itertools import combinations
 
 import numpy as np
 
-from drkid.kit import Dimensions, Handedness, MergedClass, MergedPiece, Part, PartSet, Patches, class_id
+from drkid.kit import Dimensions, Handedness, MergedClass, MergedPiece, Part, PartSet, Patches
 from drkid.measure import bend_radians
-from drkid.mesh import Bools, Floats, TriMesh, read_only
+from drkid.mesh import Floats, TriMesh, read_only
 from drkid.parts.bevel import bevel_insets, flippable_insets, limited, ridged
 from drkid.parts.dimensions import deepest_bevel_mm, held_height_mm
+from drkid.parts.foot import with_foot
 from drkid.parts.merged_piece import (
+    SKIRT_MM,
     bevel_planes,
     cutting_sides,
     demanded,
@@ -19,20 +21,23 @@ from drkid.parts.merged_piece import (
     outline_bends,
     outline_frames,
     shared,
+    slab_mesh,
 )
-from drkid.parts.merged_truncation import tips_cut
+from drkid.parts.merged_truncation import reflection, tips_cut
 from drkid.parts.pocket import pocket
+from drkid.parts.process_findings import wall_findings
 from drkid.solid import Solid
 from drkid.spec import KitSpec
 
-THIN_OF_WALL = 0.95  # of the wanted wall: thinner ones are told
+REACH = 2.0  # least walls: how far around a pocket others, and what is lost, are looked for
+FILM_MM = 0.02  # how much a piece is thinner where its losses are looked for, so that rounding is none
 
 
 def merged_parts(patches: Patches, of_triangles: PartSet, spec: KitSpec, notes: tuple[str, ...] = ()) -> PartSet:
     """The part set of merged pieces, from that of the same triangles unmerged.
 
     Every triangle of a piece keeps its pockets on the outline. Triangles that were made alike may lack room for them:
-    a note tells which shapes have walls that are too thin. What was found of single triangles' walls and bevels is
+    findings tell which shapes have walls that are too thin. What was found of single triangles' walls and bevels is
     left out; `notes` take the place of theirs.
     """
     scale, dimensions = of_triangles.scale_mm_per_unit, of_triangles.dimensions
@@ -47,10 +52,14 @@ def merged_parts(patches: Patches, of_triangles: PartSet, spec: KitSpec, notes: 
         [shape.corners for shape in shapes],
         patches.pieces,
         mesh_mm,
-        [shape.achiral for shape in shapes],
+        [shape.mirror for shape in shapes],
         dimensions.clearance_mm,
+        [_pocket_room(s, dimensions) for s in shapes],
     )
+    walls = [_pocket_wall_mm(s, i, b, dimensions) for s, i, b in zip(shapes, insets, bodies, strict=True)]
     parts = tuple(_part(k, shape, bodies[k], dimensions) for k, shape in enumerate(shapes))
+    pockets = [_deep(body, shape, dimensions) for shape, body in zip(shapes, bodies, strict=True)]
+    parts, feet = _printable(parts, shapes, pockets, dimensions, spec)
     face_part = np.zeros(len(mesh_mm.faces), np.int64)
     for piece in patches.pieces:
         face_part[list(piece.faces)] = piece.class_index
@@ -60,8 +69,11 @@ def merged_parts(patches: Patches, of_triangles: PartSet, spec: KitSpec, notes: 
         face_part=read_only(face_part),
         face_turn=read_only(np.zeros(len(face_part), np.int64)),
         groove_mm=read_only(_grooves(mesh_mm, patches.pieces, insets, dimensions)),
-        notes=(*notes, *_wall_notes(list(zip(shapes, insets, cutting, bodies, strict=True)), dimensions)),
-        findings=tuple(finding for finding in of_triangles.findings if not finding.subject.startswith("class ")),
+        notes=(*notes, *feet),
+        findings=(
+            *wall_findings(parts, walls, wall),
+            *(finding for finding in of_triangles.findings if not finding.subject.startswith("class ")),
+        ),
         groove_choices=(),
         merged=patches.pieces,
     )
@@ -78,31 +90,37 @@ def _merged_insets(
     return [_insets(mesh_mm, _scaled(shape, scale), own, dimensions, spec) for shape, own in zipped]
 
 
-def _wall_notes(rows: list[tuple[MergedClass, Floats, Bools, Solid]], dimensions: Dimensions) -> list[str]:
-    walls = [_wall_mm(*row, dimensions) for row in rows]
-    thin = [class_id(k) for k, wall in enumerate(walls) if wall < THIN_OF_WALL * dimensions.min_wall_mm]
-    if not thin:
-        return []
-    return [
-        f"Pockets of class {', '.join(thin)} have walls of {max(min(walls), 0):.2f} mm, less than the "
-        f"{dimensions.min_wall_mm:g} mm that are wanted; --merge-shift-percent 0 and --merge 2 merge more gently."
-    ]
-
-
-def _wall_mm(shape: MergedClass, insets: Floats, cutting: Bools, body: Solid, dimensions: Dimensions) -> float:
-    """The thinnest wall between two pockets, or a pocket and another side's bevel; `min_wall_mm` where it is more."""
-    thinnest = dimensions.min_wall_mm
+def _pocket_room(shape: MergedClass, dimensions: Dimensions) -> Solid:
+    """All pockets of a shape with a wall around them; nothing where there are none."""
     if dimensions.connector == "none":
-        return thinnest
+        return Solid.union([])
+    wall = dimensions.min_wall_mm
+    wider = replace(
+        dimensions,
+        pocket_width_mm=dimensions.pocket_width_mm + 2 * wall,
+        pocket_depth_mm=dimensions.pocket_depth_mm + wall,
+        pocket_height_mm=dimensions.pocket_height_mm + 2 * wall,
+    )
+    return Solid.union([pocket(wider).moved(frame) for frame in outline_frames(shape, dimensions.key_bend_degrees / 2)])
+
+
+def _pocket_wall_mm(shape: MergedClass, insets: Floats, body: Solid, dimensions: Dimensions) -> float:
+    """The thinnest wall between two pockets, or a pocket and what other sides or tips lost; `REACH` walls at most."""
+    most = REACH * dimensions.min_wall_mm
+    if dimensions.connector == "none":
+        return most
     frames = outline_frames(shape, dimensions.key_bend_degrees / 2)
     pockets = [body & pocket(dimensions).moved(frame) for frame in frames]
-    between = [one.gap(other, thinnest) for one, other in combinations(pockets, 2)]
+    gaps = [one.gap(other, most) for one, other in combinations(pockets, 2)]
+    skirt = max(-float(insets.min()), 0.0) + SKIRT_MM
+    slab = Solid.of(slab_mesh(shape, skirt, dimensions.thickness_mm - FILM_MM))
     normals, levels, sides = bevel_planes(shape, insets, dimensions.thickness_mm)
-    for i, one in enumerate(pockets):
-        others = cutting[shape.side_face[i]][sides] & (sides != i)
-        behind = one.mesh().vertices @ normals[others].T - levels[others]
-        thinnest = min(thinnest, float(behind.min(initial=thinnest)))
-    return min(thinnest, *between)
+    for i, space in enumerate(pockets):
+        behind = slab
+        for k in np.flatnonzero(sides == i).tolist():
+            behind = behind.beyond(normals[k], float(levels[k]) + FILM_MM)
+        gaps.append(space.gap(behind - body, most))
+    return min(most, *gaps)
 
 
 def _scaled(shape: MergedClass, scale: float) -> MergedClass:
@@ -138,6 +156,47 @@ def _part(index: int, shape: MergedClass, body: Solid, dimensions: Dimensions) -
     if dimensions.connector != "none":
         body = body.minus_all([pocket(dimensions).moved(frame) for frame in frames])
     return Part(index, _handedness(shape), shape.corners, frames, body.without_needles())
+
+
+def _deep(body: Solid, shape: MergedClass, dimensions: Dimensions) -> Floats:
+    """(n, 3): corners of the inner halves of a piece's pockets, that which a connector is held by."""
+    if dimensions.connector == "none":
+        return np.zeros((0, 3))
+    half = pocket(dimensions).beyond(np.array([0.0, 1.0, 0.0]), dimensions.pocket_depth_mm / 2)
+    frames = outline_frames(shape, dimensions.key_bend_degrees / 2)
+    return np.vstack([(body & half.moved(frame)).mesh().vertices for frame in frames])
+
+
+def _printable(
+    parts: tuple[Part, ...],
+    shapes: tuple[MergedClass, ...],
+    deep: list[Floats],
+    dimensions: Dimensions,
+    spec: KitSpec,
+) -> tuple[tuple[Part, ...], list[str]]:
+    """The parts with feet where they need them to print without supports, and a note that tells which have one."""
+    longest = spec.preset.longest_bridge_mm
+    if longest is None:
+        return parts, []
+    thickness, wall = dimensions.thickness_mm, dimensions.min_wall_mm
+    found = [
+        with_foot(
+            part.solid,
+            own,
+            thickness,
+            wall,
+            longest,
+            reflection(shape.corners, shape.mirror) if shape.mirror else None,
+        )
+        for part, shape, own in zip(parts, shapes, deep, strict=True)
+    ]
+    footed = [part.name for part, (_, depth) in zip(parts, found, strict=True) if depth]
+    note = (
+        f"Class {', '.join(footed)}: a flat of up to {max(depth for _, depth in found):.1f} mm is cut off the rim, on "
+        "which the piece prints without supports."
+    )
+    parts = tuple(replace(part, solid=solid) for part, (solid, _) in zip(parts, found, strict=True))
+    return parts, [note] if footed else []
 
 
 def _handedness(shape: MergedClass) -> Handedness:

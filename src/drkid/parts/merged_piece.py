@@ -9,11 +9,13 @@ from drkid.measure import bend_radians
 from drkid.mesh import Bools, Floats, Ints, TriMesh, read_only
 from drkid.parts.bevel import SHARPEST_JOINT_DEGREES
 from drkid.parts.pocket import leaning_turn
+from drkid.parts.prismoid import FROM_AXIS, RIDGED
 from drkid.rigid_fit import rigid_fit
 from drkid.solid import Solid
 
 SKIRT_MM = 1.0  # beyond what stands out of the outline; the bevels cut it away
 OVERLAP_MM = 1e-3  # beyond its folds: how far the bevels of a triangle cut, so that no film is left between two cuts
+OUTWARD = 0.2  # cosine of the angle to a side's way outwards: a line flatter than that runs along the side
 MITRE = 1e-3  # singular values below this share are left out: triangles in one plane have one normal
 
 
@@ -52,13 +54,16 @@ def demanded(
 
 
 def far_inside(mesh_mm: TriMesh, shape: MergedClass, piece: MergedPiece) -> Floats:
-    """(n,): how far the mesh's edge lies inside each side of the shape, at its farther end."""
+    """(n,): how far the mesh's edge lies inside each side of the shape, at its farther end; 0 where it lies outside.
+
+    Hinges turn about the shape's side and not about the edge: an edge outside leaves the bevels no less to do.
+    """
     corners = mesh_mm.vertices[list(piece.vertices)]
     motion = rigid_fit(corners, shape.corners)
     corners = corners @ motion[:3, :3].T + motion[:3, 3]
     inward = outline_frames(shape)[:, :3, 1]
     ends = np.stack([corners - shape.corners, np.roll(corners - shape.corners, -1, axis=0)])
-    return np.einsum("esk,sk->es", ends, inward).max(axis=0)
+    return np.einsum("esk,sk->es", ends, inward).max(axis=0, initial=0.0)
 
 
 def shared(lengths: list[Floats], shape: MergedClass) -> Floats:
@@ -137,10 +142,18 @@ def _mitre_planes(shape: MergedClass, face: int) -> list[tuple[Floats, float]]:
 
 
 def bevel_planes(shape: MergedClass, insets_mm: Floats, thickness_mm: float) -> tuple[Floats, Floats, Ints]:
-    """Unit normals (p, 3), levels (p,) and sides (p,): the piece lies where normal·p is more than each level."""
+    """Unit normals (p, 3), levels (p,) and sides (p,): the piece lies where normal·p is more than each level.
+
+    A piece bends beyond the faces of the triangle at a side: where the bevel has a ridge, planes through the hinge axis
+    keep what lies there within the swing.
+    """
     frames, found = outline_frames(shape), list[tuple[Floats, Floats]]()
-    heights = np.linspace(-thickness_mm / 2, thickness_mm / 2, len(insets_mm))
-    for (low, below), (high, above) in pairwise(zip(heights.tolist(), insets_mm, strict=True)):
+    half, axis = thickness_mm / 2, np.zeros(len(frames))
+    steps = list(pairwise(zip(np.linspace(-half, half, len(insets_mm)).tolist(), insets_mm, strict=True)))
+    if len(insets_mm) == RIDGED:
+        near = (1 - FROM_AXIS) * insets_mm[1] + FROM_AXIS * insets_mm
+        steps += [((-FROM_AXIS * half, near[0]), (0.0, axis)), ((0.0, axis), (FROM_AXIS * half, near[-1]))]
+    for (low, below), (high, above) in steps:
         slope = (above - below) / (high - low)
         normals = frames[:, :3, 1] - slope[:, None] * frames[:, :3, 2]
         levels = np.einsum("sk,sk->s", normals, frames[:, :3, 3]) + below - slope * low
@@ -173,10 +186,11 @@ def slab_mesh(shape: MergedClass, skirt_mm: float, thickness_mm: float) -> TriMe
 def _outward(shape: MergedClass) -> Floats:
     """(n, 3): where a corner goes if both of its sides move outwards by 1 at least, each in the plane of its triangle.
 
-    Along the fold where one meets the corner; else half-way between the sides, where several do only nearly in plane.
+    Along the line that the two planes share, which is the fold where one meets the corner; half-way between the sides
+    where there is one plane, or that line does not lead outwards.
     """
     frames, n = outline_frames(shape), len(shape.corners)
-    inward = frames[:, :3, 1]
+    inward, normals = frames[:, :3, 1], _face_normals(shape)[shape.side_face]
     points = np.vstack([shape.corners, shape.inner])
     out = np.empty((n, 3))
     for i in range(n):
@@ -185,6 +199,11 @@ def _outward(shape: MergedClass) -> Floats:
         if len(own) == 2:
             far = next(v for v in np.intersect1d(own[0], own[1]) if v != i)
             direction = points[i] - points[far]
+        elif len(own) > 2:
+            line = np.cross(normals[i - 1], normals[i])
+            line *= 1.0 if line @ direction > 0 else -1.0
+            steep = max(inward[i - 1] @ line, inward[i] @ line) < -OUTWARD * np.linalg.norm(line)
+            direction = line if steep else direction
         out[i] = direction / -max(inward[i - 1] @ direction, inward[i] @ direction)
     return out
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from drkid.kit import Dimensions, GrooveChoice
+from drkid.kit import Dimensions, GrooveChoice, Part
 from drkid.mesh import Floats
 from drkid.parts.bevel import SHARPEST_JOINT_DEGREES, demanded
 from drkid.parts.bevel_variants import Moulds
@@ -96,6 +96,13 @@ def corner_notes(corners: Truncated) -> Iterator[str]:
             f"Around {len(corners.vertices)} vertices ({named}) pieces that are no neighbours come nearer than hinges "
             "swing, or meet: no more of their corners can be cut off. More --faces or another --seed helps."
         )
+
+
+def room_notes(missing: list[tuple[Part, tuple[str, ...]]]) -> Iterator[str]:
+    """Which marks found no room on which parts."""
+    for part, words in missing:
+        hand = "" if part.handedness == "any" else f" ({part.handedness})"
+        yield f"Class {part.name}{hand}: no room for the {', '.join(words)} inside."
 
 
 def _short_notes(

@@ -10,6 +10,10 @@ from drkid.class_triangle import following, inward_normals
 from drkid.mesh import Floats, read_only
 from drkid.solid import Solid
 
+RIDGED = 3  # outlines, or insets of a side: at both faces and between
+FROM_AXIS = 0.9  # of half the thickness: from there on bevels with a ridge go on in planes through the hinge axes; from
+# the faces on, three planes would meet in one line
+
 
 @dataclass(frozen=True, eq=False)
 class Prismoid:
@@ -27,6 +31,11 @@ class Prismoid:
     def faces(self) -> Floats:
         """(2, 3, 2): the inner and the outer face."""
         return self.outlines[[0, -1]]
+
+    @property
+    def is_ridged(self) -> bool:
+        """Whether its bevels have a ridge along the middle plane."""
+        return len(self.outlines) == RIDGED
 
     @property
     def levels_mm(self) -> Floats:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from drkid.kit import BRIDGE, Connector, Dimensions, Finding, Part
+from drkid.kit import BRIDGE, WALL, Connector, Dimensions, Finding, Part
 from drkid.mesh import Floats, rounded
 from drkid.parts.bevel_variants import Moulds
 from drkid.parts.fit import margins
@@ -13,6 +13,7 @@ from drkid.parts.prismoid import Prismoid
 from drkid.print_orientation import print_orientation, widest_bridge_mm
 from drkid.solid import Solid
 from drkid.spec import KitSpec
+from drkid.wall_thickness import thinnest_wall_mm
 
 
 def findings(
@@ -45,10 +46,21 @@ def bridge_findings(parts: Sequence[Part], connectors: Sequence[Connector], spec
     for part in parts:
         if part.class_index not in found:
             found[part.class_index] = _bridge_mm(part.solid, longest)
-        hand = "" if part.handedness == "any" else f" ({part.handedness})"
-        yield _bridge(f"class {part.name}{hand}", longest, found[part.class_index])
+        yield _bridge(_subject(part), longest, found[part.class_index])
     for one in connectors:
         yield _bridge(one.name.replace("_", " "), longest, _bridge_mm(one.solid, longest))
+
+
+def wall_findings(parts: Sequence[Part], pocket_walls_mm: Sequence[float], least_mm: float) -> Iterator[Finding]:
+    """The thinnest wall of every merged piece, `pocket_walls_mm` being those around their pockets."""
+    for part, pocket_wall in zip(parts, pocket_walls_mm, strict=True):
+        wall = min(pocket_wall, thinnest_wall_mm(part.solid.mesh()))
+        remedy = "--merge-shift-percent 0 and --merge 2 merge more gently"
+        yield Finding(_subject(part), WALL, least_mm, wall, "mm", "at least", remedy)
+
+
+def _subject(part: Part) -> str:
+    return f"class {part.name}" if part.handedness == "any" else f"class {part.name} ({part.handedness})"
 
 
 def _bridge_mm(solid: Solid, longest_mm: float) -> float:

@@ -5,7 +5,7 @@ import numpy as np
 from drkid.mesh import Floats
 
 CELL = (4.0, 6.0)  # width and height of the grid that letters are drawn on
-ADVANCE = 6.0  # from one letter to the next
+GAP = 2.0  # between one letter and the next, on the grid
 
 _GLYPHS = {  # polylines of grid points, a digit for x and one for y
     "A": "00 04 26 44 40, 02 42",
@@ -47,18 +47,21 @@ _GLYPHS = {  # polylines of grid points, a digit for x and one for y
 }
 
 
-def strokes(text: str, height: float) -> Floats:
+def strokes(text: str, height: float, least_gap: float = 0.0) -> Floats:
     """(n, 2, 2): the ends of the strokes of letters and digits, `height` tall without the strokes' width, centred at 0.
+
+    Letters are `least_gap` apart at least.
 
     Raises:
         KeyError: a character is neither a capital letter nor a digit.
     """
+    advance = CELL[0] + max(GAP, least_gap * CELL[1] / height)
     found: list[Floats] = []
     for place, letter in enumerate(text):
         for line in _GLYPHS[letter].split(","):
             points = np.array([[int(c) for c in point] for point in line.split()], np.float64)
-            points[:, 0] += place * ADVANCE
+            points[:, 0] += place * advance
             found.append(np.stack([points[:-1], points[1:]], axis=1))
     lines = np.concatenate(found)
-    middle = np.array([(len(text) - 1) * ADVANCE + CELL[0], CELL[1]]) / 2
+    middle = np.array([(len(text) - 1) * advance + CELL[0], CELL[1]]) / 2
     return (lines - middle) * height / CELL[1]

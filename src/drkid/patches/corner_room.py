@@ -14,7 +14,8 @@ from drkid.patches.outline import Outlined, corner_angles
 
 HALF_WIDTH, DEPTH = 0.11, 0.2  # of a pocket, in mean edges of the smallest print
 HALVINGS = 40
-ROUNDING = 0.0015  # of the mean edge: less room than that is not missed
+SPARE = 0.0015  # of the mean edge: how much more room is aimed at than is needed, since no length is met exactly
+ROUNDING = 0.0002  # of the mean edge: less room than that is not missed
 NARROWEST = 0.1  # radians: no corner that is looked for is narrower
 
 
@@ -23,7 +24,8 @@ class CornerRooms:
     """Corners of M_f at which two pockets of one piece meet, and what keeps them apart.
 
     `corners` (n, 3) are the vertices at a corner, after it and before it; `least_room` is what the tightest triangle
-    has. At `least` (m,) lengths of the inner edges `pairs` (m, 2) opposite, and sides as they are, corners have that.
+    has. At `least` (m,) lengths of the inner edges `pairs` (m, 2) opposite, and sides as they are, corners have that
+    and a little to spare, or as much as they have now.
     """
 
     mean_edge: float
@@ -82,7 +84,7 @@ def corner_rooms(mesh: TriMesh, pieces: list[Outlined]) -> CornerRooms:
     low, high = np.full(len(rows), NARROWEST), angle[face, corner]
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        enough = room(after, before, middle, mesh.mean_edge) >= rooms.min()
+        enough = room(after, before, middle, mesh.mean_edge) >= rooms.min() + SPARE * mesh.mean_edge
         low, high = np.where(enough, low, middle), np.where(enough, middle, high)
     least = np.sqrt(after**2 + before**2 - 2 * after * before * np.cos(high))
     own = mesh.faces[face]

@@ -5,7 +5,7 @@ import rustworkx as rx
 
 from drkid.mesh import Bools, Floats, Ints, TriMesh
 from drkid.patches.identity import residuals, shapes
-from drkid.patches.outline import WIDEST, outlined
+from drkid.patches.outline import outlined
 
 ROUNDS = 12  # of a matching for the shapes that are popular and a count of those that it leaves
 SHARES = 1_000_000  # weights of a matching are whole numbers
@@ -14,14 +14,16 @@ SHARES = 1_000_000  # weights of a matching are whole numbers
 def paired(mesh: TriMesh, tolerance: float) -> list[tuple[int, ...]]:
     """Pairs of neighbouring faces and the faces left over, as tuples.
 
-    Only pairs of convex outline are taken. A maximum matching of the dual graph (Edmonds 1965): every face of a
-    closed surface, whose dual is cubic and bridgeless, finds a partner (Petersen 1891). Of the perfect matchings one
-    is sought that needs few shapes: pairs count by how many of the pairs chosen before, at first of all possible
-    ones, have their shape.
+    Only pairs of convex outline are taken, folded by a right angle at most. A maximum matching of the dual graph
+    (Edmonds 1965): where no edge is sharper every face of a closed surface, whose dual is cubic and bridgeless, finds a
+    partner (Petersen 1891). Of the perfect matchings one is sought that needs few shapes: pairs count by how many of
+    the pairs chosen before, at first of all possible ones, have their shape.
     """
     pairs = [tuple(int(f) for f in pair) for pair in mesh.edge_faces]
-    candidates = [piece for piece in (outlined(mesh, pair) for pair in pairs) if piece.widest_angle(mesh) <= WIDEST]
+    candidates = [piece for piece in (outlined(mesh, pair) for pair in pairs) if piece.makes_a_piece(mesh)]
     pairs = [piece.faces for piece in candidates]
+    if not pairs:
+        return [(f,) for f in range(len(mesh.faces))]
     near = residuals(mesh, candidates)[0] <= tolerance
     weight = near.sum(axis=1).astype(np.float64)
     best: tuple[int, list[int]] | None = None

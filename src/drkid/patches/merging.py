@@ -10,7 +10,7 @@ from drkid.patches.agglomeration import agglomerated, renumbered
 from drkid.patches.distance_geometry import place
 from drkid.patches.identity import mirror_corners, misfits, symmetrised
 from drkid.patches.matching import paired
-from drkid.patches.outline import Outlined, outlined
+from drkid.patches.outline import Outlined, outlined, sharpest_fold
 from drkid.patches.vertex_star import starred
 from drkid.spec import KitSpec
 
@@ -111,7 +111,7 @@ def _shape(points: Floats, piece: Outlined, flat_radians: float, image: tuple[in
     x = x - (x @ z) * z
     x /= np.linalg.norm(x)
     local = (points - corners.mean(axis=0)) @ np.stack([x, np.cross(z, x), z], axis=1)
-    if _sharpest(shell) <= flat_radians:
+    if sharpest_fold(points, piece.triangles) <= flat_radians:
         local[:, 2] = 0.0
     return MergedClass(
         read_only(local[:count].copy()),
@@ -120,16 +120,6 @@ def _shape(points: Floats, piece: Outlined, flat_radians: float, image: tuple[in
         piece.side_face,
         image,
     )
-
-
-def _sharpest(shell: TriMesh) -> float:
-    """The sharpest bend between two triangles of a piece, in radians."""
-    normals = shell.face_normals
-    owner: dict[tuple[int, int], int] = {}
-    for face, row in enumerate(shell.faces.tolist()):
-        owner |= {(row[i], row[(i + 1) % 3]): face for i in range(3)}
-    pairs = [(face, owner[b, a]) for (a, b), face in owner.items() if (b, a) in owner]
-    return max((float(np.arccos(np.clip(normals[f] @ normals[g], -1, 1))) for f, g in pairs), default=0.0)
 
 
 def _divided(

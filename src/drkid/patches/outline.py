@@ -8,6 +8,8 @@ from drkid.mesh import Floats, Ints, TriMesh, read_only
 
 WIDEST = np.radians(178.0)  # angle of an outline: a convex piece can be cut by the planes of its sides
 
+SHARPEST_FOLD = np.radians(90.0)  # between two triangles of one piece
+
 
 @dataclass(frozen=True, eq=False)
 class Outlined:
@@ -44,6 +46,14 @@ class Outlined:
         total = np.bincount(self.triangles.ravel(), weights=angles.ravel())
         return float(total[: len(self.vertices)].max())
 
+    def sharpest_fold(self, mesh: TriMesh) -> float:
+        """The sharpest bend between two of its triangles, in radians; 0 of a single one."""
+        return sharpest_fold(self.points(mesh), self.triangles)
+
+    def makes_a_piece(self, mesh: TriMesh) -> bool:
+        """Whether the outline is convex, and no fold so sharp that the bevels of one triangle cut another's pockets."""
+        return self.widest_angle(mesh) <= WIDEST and self.sharpest_fold(mesh) <= SHARPEST_FOLD
+
     @property
     def pattern(self) -> frozenset[tuple[int, ...]]:
         """The triangles as sets of numbers: what a relabelling has to keep."""
@@ -70,6 +80,14 @@ def outlined(mesh: TriMesh, faces: tuple[int, ...]) -> Outlined:
     triangles = np.array([[number[int(v)] for v in row] for row in corners], np.int64)
     side_face = [sides[a, b] for a, b in zip(loop, [*loop[1:], loop[0]], strict=True)]
     return Outlined(faces, tuple(loop), inner, read_only(triangles), read_only(np.array(side_face, np.int64)))
+
+
+def sharpest_fold(points: Floats, triangles: Ints) -> float:
+    """The sharpest bend between two neighbours of triangles (f, 3) of points (n, 3), in radians; 0 where none are."""
+    normals = TriMesh(points, triangles).face_normals
+    owner = {(row[i], row[(i + 1) % 3]): face for face, row in enumerate(triangles.tolist()) for i in range(3)}
+    pairs = [(face, owner[b, a]) for (a, b), face in owner.items() if (b, a) in owner]
+    return max((float(np.arccos(np.clip(normals[f] @ normals[g], -1, 1))) for f, g in pairs), default=0.0)
 
 
 def corner_angles(mesh: TriMesh) -> Floats:

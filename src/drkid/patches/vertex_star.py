@@ -4,29 +4,42 @@ from collections import Counter
 
 import numpy as np
 
-from drkid.mesh import Bools, Floats, TriMesh
+from drkid.mesh import Bools, Floats, Ints, TriMesh
 from drkid.patches.identity import residuals, shapes
 from drkid.patches.outline import WIDEST, corner_angles, outlined
+
+FREE = -1  # owner of a face that is in no piece yet
 
 
 def starred(mesh: TriMesh, size: int, tolerance: float) -> list[tuple[int, ...]]:
     """Disjoint stars of vertices of valence `size`, then the largest convex parts of stars, then what is left.
 
     Whole stars are chosen so that many have few neighbours in common with others and a shape that is frequent;
-    smaller whole stars follow, then runs of triangles round a vertex, of `size` at most.
+    smaller whole stars follow, then runs of triangles round a vertex, of `size` at most. None meets another on both
+    sides of a corner in which there is no third piece: two pieces with two hinges could not turn.
     """
     fans = _fans(mesh)
-    free = np.ones(len(mesh.faces), np.bool_)
+    owner = np.full(len(mesh.faces), FREE)
     taken: list[tuple[int, ...]] = []
     for valence in range(size, 2, -1):
-        for vertex in _apart(mesh, fans, free, valence, tolerance):
-            taken.append(fans[vertex])
-            free[list(fans[vertex])] = False
+        for vertex in _apart(mesh, fans, owner == FREE, valence, tolerance):
+            if _meets_two(mesh, fans, owner, fans[vertex]):
+                owner[list(fans[vertex])] = len(taken)
+                taken.append(fans[vertex])
     angles = corner_angles(mesh)
-    while (run := _longest_run(mesh, fans, free, angles, size)) is not None:
+    while (run := _longest_run(mesh, fans, owner, angles, size)) is not None:
+        owner[list(run)] = len(taken)
         taken.append(run)
-        free[list(run)] = False
-    return [*taken, *((int(f),) for f in np.flatnonzero(free))]
+    return [*taken, *((int(f),) for f in np.flatnonzero(owner == FREE))]
+
+
+def _meets_two(mesh: TriMesh, fans: list[tuple[int, ...]], owner: Ints, piece: tuple[int, ...]) -> bool:
+    """Whether two others at least meet a piece in each of its corners, be it that free faces stay apart there."""
+    for vertex in np.unique(mesh.faces[list(piece)]).tolist():
+        around = [int(owner[face]) for face in fans[vertex] if face not in piece]
+        if around and len(set(around) - {FREE}) + around.count(FREE) < 2:
+            return False
+    return True
 
 
 def _fans(mesh: TriMesh) -> list[tuple[int, ...]]:
@@ -48,7 +61,7 @@ def _fans(mesh: TriMesh) -> list[tuple[int, ...]]:
 def _apart(mesh: TriMesh, fans: list[tuple[int, ...]], free: Bools, valence: int, tolerance: float) -> list[int]:
     """Vertices of a valence whose stars are free and share no face: fewest rivals first, then frequent shapes."""
     open_ = [v for v, fan in enumerate(fans) if len(fan) == valence and free[list(fan)].all()]
-    open_ = [v for v in open_ if outlined(mesh, fans[v]).widest_angle(mesh) <= WIDEST]
+    open_ = [v for v in open_ if outlined(mesh, fans[v]).makes_a_piece(mesh)]
     if not open_:
         return []
     stands = shapes(residuals(mesh, [outlined(mesh, fans[v]) for v in open_])[0], tolerance)
@@ -69,7 +82,7 @@ def _apart(mesh: TriMesh, fans: list[tuple[int, ...]], free: Bools, valence: int
 
 
 def _longest_run(
-    mesh: TriMesh, fans: list[tuple[int, ...]], free: Bools, angles: Floats, size: int
+    mesh: TriMesh, fans: list[tuple[int, ...]], owner: Ints, angles: Floats, size: int
 ) -> tuple[int, ...] | None:
     """The most free faces in a row round any vertex that make a convex piece; None where no two are left."""
     best: tuple[int, ...] = ()
@@ -80,9 +93,13 @@ def _longest_run(
             angle = 0.0
             for f in (*fan[start:], *fan[:start]):
                 angle += turn[f]
-                if not free[f] or len(run) == size or angle > WIDEST:
+                if owner[f] != FREE or len(run) == size or angle > WIDEST:
                     break
                 run.append(f)
-            if len(run) > max(len(best), 1) and outlined(mesh, tuple(run)).widest_angle(mesh) <= WIDEST:
+            if (
+                len(run) > max(len(best), 1)
+                and outlined(mesh, tuple(run)).makes_a_piece(mesh)
+                and _meets_two(mesh, fans, owner, tuple(run))
+            ):
                 best = tuple(run)
     return best if len(best) > 1 else None

@@ -1,4 +1,4 @@
-"""Pictures of the guide: what stands, the new pieces in their classes' colours, numbers, letters and ticks."""
+"""Pictures of the guide: what stands, the new pieces in their classes' colours, numbers, letters, ticks or sides."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -22,6 +22,7 @@ MOST_VIEWS = 4  # of one group
 LEAST_FACING = 0.3  # cosine to the eye below which a face is too oblique for words
 STANDING, STANDING_LINE, NEW_LINE = "#E4E6EA", "#8A8F99", "#000000"
 OUTER_COSINE = 0.99  # to the piece's normal: faces that are more oblique are its sides
+BESIDE_SIDE = 0.45  # of the way from a side to the middle of its triangle: where its number stands
 ON_SIDE = 1e-6  # of a face's size: points that are nearer to one of its sides lie on it
 STEEPEST = 80.0  # degrees of elevation
 DIRECTIONS = [(float(a), float(e)) for e in (-60, -20, 20, 60) for a in range(0, 360, 45)]
@@ -220,20 +221,40 @@ class Builder:
         middle = np.array([SAMPLES / 2, SAMPLES / 2, 0])
         screen = (corners[used] - scene.middle) @ view.T * [samples, -samples, samples] + middle
         faces, _, _ = rasterise(screen, SAMPLES, SAMPLES)
+
+        def shown(piece: int, point: Floats, normal: Floats) -> Floats | None:
+            """(2,): where a point of a piece, in world coordinates, is on paper; None where the picture hides it."""
+            at = (point - scene.middle) @ view.T
+            x, y = (at * [samples, -samples, 1] + middle)[:2].astype(int)
+            seen = float(normal @ view[2]) >= LEAST_FACING and faces[y, x] >= 0
+            return at[:2] * scale + shift if seen and owner[used[faces[y, x]]] == piece else None
+
         items: list[Shape | Word] = []
         for piece in standing:
             step = int(scene.piece_step[piece])
             if piece not in new and step not in asked:
                 continue
             top = self._outer_corners(piece)
-            flat = (top - scene.middle) @ view.T
-            x, y = (flat.mean(axis=0) * [samples, -samples, 1] + middle)[:2].astype(int)
-            facing = float(scene.transforms[piece][:3, 2] @ view[2])
-            if facing < LEAST_FACING or faces[y, x] < 0 or owner[used[faces[y, x]]] != piece:
-                continue
-            on_paper = flat[:, :2] * scale + shift
-            items += self._label(piece, new.get(piece), on_paper)
+            on_paper = ((top - scene.middle) @ view.T)[:, :2] * scale + shift
+            if piece in new and self.guide.is_merged:
+                size = 0.7 * _letter_size(on_paper)
+                sides = [(shown(piece, *side), number) for number, side in enumerate(self._sides(piece), 1)]
+                items += [_side_number(at, number, size) for at, number in sides if at is not None]
+            if shown(piece, top.mean(axis=0), scene.transforms[piece][:3, 2]) is not None:
+                items += self._label(piece, new.get(piece), on_paper)
         return items
+
+    def _sides(self, piece: int) -> list[tuple[Floats, Floats]]:
+        """Beside each side of a merged piece a point of its outer face, in world coordinates, and the normal there."""
+        scene = self.guide.scene
+        one, mesh = scene.document.pieces[piece], scene.assembled
+        thickness, found = float(scene.document.spec["thickness_mm"]), list[tuple[Floats, Floats]]()
+        for a, b in zip(one.corners, [*one.corners[1:], one.corners[0]], strict=True):
+            face = next(f for f in one.covered if {a, b} <= set(mesh.faces[f].tolist()))
+            side = (mesh.vertices[a] + mesh.vertices[b]) / 2
+            normal = mesh.face_normals[face]
+            found.append((side + BESIDE_SIDE * (mesh.middles[face] - side) + thickness / 2 * normal, normal))
+        return found
 
     def _outer_corners(self, piece: int) -> Floats:
         """(n, 3): the part's corners on its outer face, in world coordinates."""
@@ -245,32 +266,44 @@ class Builder:
 
     def _label(self, piece: int, instruction: Instruction | None, corners: Floats) -> list[Shape | Word]:
         middle, step = corners.mean(axis=0), str(int(self.guide.scene.piece_step[piece]))
-        radius = float(np.linalg.norm(corners - middle, axis=1).min())
-        size = float(np.clip(0.42 * radius, 1.6, 4.2))
+        size = _letter_size(corners)
         if instruction is None:
             return [Word(middle[0], middle[1], step, 0.85 * size, colour="#333333")]
-        letter = _short(instruction.part)
+        letter, part = _short(instruction.part), self.guide.scene.document.pieces[piece].part
         return [
-            *ticks(corners, self.guide.part_ticks[self.guide.scene.document.pieces[piece].part], 0.75 * size),
+            *([] if self.guide.is_merged else ticks(corners, self.guide.part_sides[part], 0.75 * size)),
             Word(middle[0], middle[1] + 0.45 * size, step, size, True, "#000000", "#FFFFFF"),
             Word(middle[0], middle[1] - 0.5 * size, letter, 0.75 * size, False, "#000000", "#FFFFFF"),
         ]
 
     def part_drawing(self, file: str, width: float) -> Drawing:
-        """A part's outer face with its letter and its ticks."""
+        """A part's outer face with its letter and its ticks, or the numbers of its sides."""
         classes = self.guide.scene.document.classes
         number, part = next((i, p) for i, c in enumerate(classes) for p in c.parts if p.file == file)
         corners = np.array(part.corners)[:, :2]
         low, extents = corners.min(axis=0), np.ptp(corners, axis=0)
         flat = (corners - low) * ((width - 2) / extents.max()) + 1
         middle, size = flat.mean(axis=0), width / 6
+        sides = self.guide.part_sides[file]
+        ends = zip(flat, np.roll(flat, -1, axis=0), sides, strict=True)
+        numbers = [_side_number((0.8 * (a + b) / 2 + 0.2 * middle), number, width / 10) for a, b, number in ends]
         items = (
             Shape(flat, class_colour(number), NEW_LINE, 0.35),
             Word(middle[0], middle[1], _short(self.guide.part_names[file]), size, True, "#000000", "#FFFFFF"),
-            *ticks(flat, self.guide.part_ticks[file], width / 9),
+            *(numbers if self.guide.is_merged else ticks(flat, sides, width / 9)),
         )
         name = self.guide.part_names[file]
         return Drawing(width, float(flat[:, 1].max()) + 1, items, f"Outer face of a piece {name}")
+
+
+def _letter_size(corners: Floats) -> float:
+    """Of a piece's number in mm, as its corners (n, 2) on paper have room for it."""
+    radius = float(np.linalg.norm(corners - corners.mean(axis=0), axis=1).min())
+    return float(np.clip(0.42 * radius, 1.6, 4.2))
+
+
+def _side_number(at: Floats, number: int, size: float) -> Word:
+    return Word(float(at[0]), float(at[1]), str(number), size, False, "#000000", "#FFFFFF")
 
 
 def ticks(corners: Floats, counts: tuple[int, ...], length: float) -> list[Shape]:

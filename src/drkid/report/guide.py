@@ -16,11 +16,11 @@ SAME_LENGTH = 1e-4  # of the longest side: sides of a class that differ by less 
 
 @dataclass(frozen=True)
 class Join:
-    """A side of the new piece and the side of a standing one that it meets, by their ticks."""
+    """A side of the new piece and the side of a standing one that it meets, in words."""
 
-    ticks: int
+    side: str
     other_step: int
-    other_ticks: int
+    other_side: str
 
 
 @dataclass(frozen=True)
@@ -40,26 +40,43 @@ class Guide:
     scene: Scene
 
     @cached_property
+    def is_merged(self) -> bool:
+        """Whether pieces are merged: their sides then have numbers, because ticks do not tell equal ones apart."""
+        return self.scene.document.is_merged
+
+    @cached_property
     def ticks(self) -> tuple[tuple[int, ...], ...]:
         """For each class the ticks of its sides, ascending: 1 for the shortest length, 2 for the next."""
         return tuple(ranks(np.array(one.edge_lengths)) for one in self.scene.document.classes)
 
     @cached_property
-    def part_ticks(self) -> dict[str, tuple[int, ...]]:
-        """For each part the ticks of its sides, in the order of its corners."""
+    def part_sides(self) -> dict[str, tuple[int, ...]]:
+        """For each part the ticks of its sides, or the numbers of a merged one's, in the order of its corners."""
         found: dict[str, tuple[int, ...]] = {}
+        if self.is_merged:
+            parts = [part for one in self.scene.document.classes for part in one.parts]
+            return {part.file: tuple(range(1, 1 + len(part.corners))) for part in parts}
         for one, ticks in zip(self.scene.document.classes, self.ticks, strict=True):
             for part in one.parts:
-                corners = np.array(part.corners)
-                sides = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
-                order = np.argsort(np.argsort(sides, kind="stable"), kind="stable")
+                order = np.argsort(np.argsort(part.side_lengths, kind="stable"), kind="stable")
                 found[part.file] = tuple(ticks[i] for i in order)
         return found
 
     @cached_property
     def part_names(self) -> dict[str, str]:
-        """What each part is called: its class's letter, its bevel's number and its hand where these differ."""
-        return {part.file: part_label(part.file) for one in self.scene.document.classes for part in one.parts}
+        """What each part is called: its class's letter, its bevel's number and its hand where these differ.
+
+        Mirror images of merged pieces are classes of their own, which have letters enough.
+        """
+        return {
+            part.file: one.id if self.is_merged else part_label(part.file)
+            for one in self.scene.document.classes
+            for part in one.parts
+        }
+
+    def side_word(self, side: int) -> str:
+        """The ticks of a side, or its number, as they are written."""
+        return f"side {side}" if self.is_merged else tick_word(side)
 
     @cached_property
     def instructions(self) -> tuple[Instruction, ...]:
@@ -79,18 +96,18 @@ class Guide:
     def _joins(self, step: int, piece: int, joints: list[tuple[int, tuple[int, int]]]) -> tuple[Join, ...]:
         steps = self.scene.piece_step
         found = [
-            Join(self._ticks_at(piece, edge), int(steps[other]), self._ticks_at(other, edge))
+            Join(self._side_at(piece, edge), int(steps[other]), self._side_at(other, edge))
             for other, edge in joints
             if steps[other] < step
         ]
         return tuple(sorted(found, key=lambda join: join.other_step))
 
-    def _ticks_at(self, piece: int, edge: tuple[int, int]) -> int:
+    def _side_at(self, piece: int, edge: tuple[int, int]) -> str:
         one = self.scene.document.pieces[piece]
         corners = list(one.corners)
         following = corners[1:] + corners[:1]
         side = next(i for i, ends in enumerate(zip(corners, following, strict=True)) if set(ends) == set(edge))
-        return self.part_ticks[one.part][side]
+        return self.side_word(self.part_sides[one.part][side])
 
     @cached_property
     def groups(self) -> tuple[tuple[Instruction, ...], ...]:
@@ -112,12 +129,10 @@ def tick_word(count: int) -> str:
 
 
 def joined_text(instruction: Instruction) -> str:
-    """Which side meets which, in words: '| to | of 3, || to || of 7'."""
+    """Which side meets which, in words: '| to | of 3, || to || of 7', or 'side 2 to side 5 of 3' of merged pieces."""
     if not instruction.joins:
         return "stands alone"
-    return ", ".join(
-        f"{tick_word(join.ticks)} to {tick_word(join.other_ticks)} of {join.other_step}" for join in instruction.joins
-    )
+    return ", ".join(f"{join.side} to {join.other_side} of {join.other_step}" for join in instruction.joins)
 
 
 def closing_text(guide: Guide) -> str:

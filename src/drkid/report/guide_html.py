@@ -6,7 +6,7 @@ from importlib.resources import files
 from string import Template
 
 from drkid.report.drawing import svg
-from drkid.report.guide import Guide, Instruction, joined_text, tick_word
+from drkid.report.guide import Guide, Instruction, joined_text
 from drkid.report.guide_pages import Page, front_lines, part_lines
 from drkid.report.tables import Html, table
 
@@ -37,8 +37,8 @@ def _front(guide: Guide, closing: Page) -> str:
     return lines + table(("outer face", "piece", "how many", "file", "sides in mm"), rows)
 
 
-def _sides(sides: tuple[tuple[int, float], ...]) -> str:
-    return ", ".join(f'<span class="ticks">{tick_word(count)}</span> {length:.1f}' for count, length in sides)
+def _sides(sides: tuple[tuple[str, float], ...]) -> str:
+    return ", ".join(f'<span class="ticks">{word}</span> {length:.1f}' for word, length in sides)
 
 
 def _group(page: Page) -> str:

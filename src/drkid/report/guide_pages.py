@@ -4,10 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drkid.export.document import ClassDocument, PartDocument
 from drkid.mesh import Floats
 from drkid.report.building_picture import Builder
 from drkid.report.drawing import Drawing
-from drkid.report.guide import Guide, Instruction, closing_text, joining_text
+from drkid.report.guide import Guide, Instruction, closing_text, joining_text, tick_word
 
 SHEET_MM = (180.0, 180.0)  # room for the pictures of a group on A4
 GAP_MM = 5.0  # between pictures
@@ -16,12 +17,12 @@ PART_MM = 28.0  # width of a part in the table of classes
 
 @dataclass(frozen=True)
 class PartLine:
-    """A row of the table of pieces: `sides` are their ticks and lengths, ascending."""
+    """A row of the table of pieces: `sides` are their ticks and lengths, ascending, or numbers and lengths in order."""
 
     file: str
     name: str
     count: int
-    sides: tuple[tuple[int, float], ...]
+    sides: tuple[tuple[str, float], ...]
 
 
 @dataclass(frozen=True)
@@ -75,15 +76,18 @@ def _scale(shapes: list[Floats], columns: int) -> float:
 def part_lines(guide: Guide) -> list[PartLine]:
     """What there is of each part."""
     return [
-        PartLine(
-            part.file,
-            guide.part_names[part.file],
-            part.count,
-            tuple(zip(ticks, one.edge_lengths, strict=True)),
-        )
+        PartLine(part.file, guide.part_names[part.file], part.count, _sides(guide, ticks, one, part))
         for one, ticks in zip(guide.scene.document.classes, guide.ticks, strict=True)
         for part in one.parts
     ]
+
+
+def _sides(
+    guide: Guide, ticks: tuple[int, ...], one: ClassDocument, part: PartDocument
+) -> tuple[tuple[str, float], ...]:
+    if guide.is_merged:
+        return tuple((f"{number}:", length) for number, length in enumerate(part.side_lengths, 1))
+    return tuple((tick_word(count), length) for count, length in zip(ticks, one.edge_lengths, strict=True))
 
 
 def front_lines(guide: Guide) -> list[str]:
@@ -96,12 +100,35 @@ def front_lines(guide: Guide) -> list[str]:
     return [
         f"{len(document.pieces)} pieces in {len(document.classes)} classes{also}; about "
         f"{' × '.join(f'{x:.0f}' for x in guide.scene.assembled.extents)} mm when it stands.",
+        *(_merged_lines(guide) if guide.is_merged else _lines()),
+        "You look at the outer faces. " + joining_text(guide),
+    ]
+
+
+def _lines() -> list[str]:
+    return [
         "Every piece has the number of its step. Pictures show what stands, grey, and the new pieces in the colour of "
         "their class, with their number, the letter of their class and ticks that tell their sides apart: one tick on "
         "the shortest side, two on the next longer, three on the longest; equal sides carry equal ticks.",
         "A line such as “7 A: | to || of 3” means: piece 7 is of class A; join its side with one tick to the side "
         "with two ticks of piece 3. L and R in pictures are the left and right hand of pieces whose mirror images "
-        "differ. You look at the outer faces. " + joining_text(guide),
+        "differ.",
+    ]
+
+
+def _merged_lines(guide: Guide) -> list[str]:
+    spec = guide.scene.document.spec
+    engraved = spec.get("marks") and spec.get("mark_depth_mm")
+    return [
+        "Every piece has the number of its step. Pictures show what stands, grey, and the new pieces in the colour of "
+        "their class, with their number, the letters of their class and the numbers of their sides, which run "
+        "counter-clockwise.",
+        "A line such as “7 B: side 2 to side 5 of 3” means: piece 7 is of class B; join its side 2 to side 5 of "
+        "piece 3.",
+        "The same letters and numbers are engraved inside, where there was room; seen from there sides run clockwise."
+        if engraved
+        else "Pieces bear no marks, and many look alike. Each build plate holds one class: write its letters, and 1 "
+        "beside side 1, on the inner face of each piece as it comes off.",
     ]
 
 

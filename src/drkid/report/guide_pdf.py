@@ -6,7 +6,7 @@ from reportlab.lib.utils import simpleSplit
 from reportlab.pdfgen.canvas import Canvas
 
 from drkid.report.drawing import POINT, draw_on
-from drkid.report.guide import Guide, joined_text, tick_word
+from drkid.report.guide import Guide, joined_text
 from drkid.report.guide_pages import GAP_MM, Page, PartLine, front_lines, part_lines
 
 WIDTH, HEIGHT, MARGIN = 210.0, 297.0, 15.0  # mm: A4
@@ -84,7 +84,7 @@ def _parts(sheet: _Sheet, lines: list[PartLine], closing: Page) -> None:
         sheet.room(drawing.height + 4)
         draw_on(sheet.canvas, drawing, MARGIN, sheet.y - drawing.height)
         middle, x = sheet.y - drawing.height / 2, MARGIN + drawing.width + 8
-        sides = ",   ".join(f"{tick_word(count)} {length:.1f} mm" for count, length in line.sides)
+        sides = ",   ".join(f"{word} {length:.1f} mm" for word, length in line.sides)
         after = sheet.y - drawing.height - 4
         sheet.y = middle + 6
         sheet.line(f"{line.count} × {line.name}", HEAD, x, "Helvetica-Bold")

@@ -7,7 +7,7 @@ from importlib.resources import files
 from typing import Any
 
 from drkid.export.colour import class_colour
-from drkid.export.document import DistanceDocument, KitDocument
+from drkid.export.document import ClassDocument, DistanceDocument, KitDocument
 
 PAPER_COLUMNS = ("", "pieces", "classes", "largest error %", "mean error %", "d(Mi, Ms) %", "d(Ms, Mf) %",
                  "d(Mi, Mf) %", "seconds", "iterations")  # fmt: skip
@@ -69,18 +69,24 @@ def swatch(colour: str) -> Html:
 
 
 def classes_table(document: KitDocument) -> str:
-    """Every class: its colour, how many pieces of which file, and its sides."""
+    """Every class: its colour, how many pieces of which file, and its sides, those of merged pieces in their order."""
     rows = [
         (
             Html(swatch(class_colour(i)) + escape(one.id)),
             one.count,
             ", ".join(f"{part.count} × {part.file}" for part in one.parts),
-            ", ".join(f"{length:.2f}" for length in one.edge_lengths),
+            _sides(document, one),
             "one shape" if one.mirror_symmetric else "mirror images differ",
         )
         for i, one in enumerate(document.classes)
     ]
     return table(("class", "pieces", "files", "sides in mm", "mirror image"), rows)
+
+
+def _sides(document: KitDocument, one: ClassDocument) -> str:
+    if document.is_merged:
+        return ", ".join(f"{number}: {length:.2f}" for number, length in enumerate(one.parts[0].side_lengths, 1))
+    return ", ".join(f"{length:.2f}" for length in one.edge_lengths)
 
 
 def paper_table(document: KitDocument) -> str:
