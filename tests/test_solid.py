@@ -90,3 +90,22 @@ def test_corners_that_nearly_coincide_become_one(off) -> None:
     assert len(clean.mesh().vertices) == 8
     assert clean.volume == pytest.approx(box.volume, rel=1e-6)
     assert box.without_needles() is box
+
+
+def flattest(solid: Solid) -> float:
+    """Of all faces the least distance of a corner from the longest side."""
+    mesh = solid.mesh()
+    return float((2 * mesh.areas / mesh.side_lengths.max(axis=1)).min())
+
+
+@pytest.mark.parametrize("off", [1e-6, 4e-5])
+def test_no_corner_lies_on_the_side_opposite(off) -> None:
+    """A tetrahedron with a fifth corner so near to one of its edges that single precision may take it across."""
+    corners = np.array([[0.0, 0, 0], [30, 0, 0], [10, 20, 0], [12, 7, 25], [15, off, 0]])
+    faces = np.array([[0, 2, 4], [4, 2, 1], [0, 4, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+    flat = Solid.of(TriMesh(corners, faces))
+    clean = flat.without_needles()
+    assert flattest(flat) < 2 * off
+    assert flattest(clean) > 1
+    assert clean.mesh().is_closed_manifold
+    assert clean.volume == pytest.approx(flat.volume, abs=1e-2)

@@ -1,8 +1,8 @@
 """The one page that calls the stages in order: `make_kit(source, spec) -> Kit`."""
 
 import time
-from collections.abc import Generator
-from contextlib import contextmanager
+from collections.abc import Callable, Generator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from drkid.export import write_kit
 from drkid.formats import is_mesh_path
 from drkid.intersection import self_intersections
 from drkid.kit import Decomposition, Kit, PartSet, Patches, Simplified, Surface
+from drkid.mesh import TriMesh
 from drkid.metrics import measure_kit
 from drkid.moulds import corrected_faces, faces_at_size, require_agreement, size_notes, with_moulds_of
 from drkid.parts import make_parts
@@ -26,6 +27,7 @@ from drkid.surface import extract_surface
 from drkid.volume import read_volume
 from drkid.wall_thickness import require_walls
 
+ROUNDING = 1e-9  # of a tolerance that is held against the one that was asked
 STAGES = ("surface", "remesh", "congruence", "patches", "parts", "assembly", "measure")
 
 
@@ -61,13 +63,10 @@ def make_kit(source: str | Path | None = None, spec: KitSpec | None = None, prog
         spec, simplified = _simplified(surface, spec, told)
     with stage("congruence") as told:
         decomposition = decompose(simplified.mesh, spec, told, simplified.target)
-    with stage("patches") as told:
-        patches = make_patches(decomposition, surface.mesh, spec, told)
     triangles = decomposition
+    patches, part_set = _cut(triangles, surface.mesh, spec, stage)
     decomposition = decomposition if patches is None else _as_stiff_as_moved(patches.decomposition, triangles)
     unmerged = triangles if spec.merge else decomposition
-    with stage("parts") as told:
-        part_set = make_parts(unmerged, spec, told, patches)
     patches = None if patches is None else flattened_patches(patches, part_set.patch_share, spec.subdivision_levels)
     scale = part_set.scale_mm_per_unit
     printed = _scaled(part_set.by_parts(decomposition), scale)
@@ -135,6 +134,37 @@ def _remeshed(surface: Surface, spec: KitSpec, progress: Progress) -> Simplified
     thin = require_walls(surface.mesh, spec.face_count(surface.mesh.genus))
     simplified = simplify(surface, spec, progress)
     return replace(simplified, notes=(*thin, *simplified.notes))
+
+
+def _cut(
+    triangles: Decomposition, surface: TriMesh, spec: KitSpec, stage: Callable[[str], AbstractContextManager[Progress]]
+) -> tuple[Patches | None, PartSet]:
+    """Patches and parts: once more where the print is larger than the one for which patches kept their tolerance."""
+    with stage("patches") as told:
+        patches = make_patches(triangles, surface, spec, told)
+    with stage("parts") as told:
+        part_set = make_parts(_to_cut(triangles, patches), spec, told, patches)
+        sized = _sized(spec, triangles, patches, part_set)
+        if sized is not None:
+            patches = make_patches(triangles, surface, sized, told)
+            part_set = make_parts(_to_cut(triangles, patches), spec, told, patches)
+    return patches, part_set
+
+
+def _to_cut(triangles: Decomposition, patches: Patches | None) -> Decomposition:
+    """What parts are made from: merged pieces from the triangles, curved ones from their own classes."""
+    return triangles if patches is None or patches.merged else patches.decomposition
+
+
+def _sized(spec: KitSpec, triangles: Decomposition, patches: Patches | None, part_set: PartSet) -> KitSpec | None:
+    """The spec with the size that was found, where patches kept a tolerance for a smaller one; None where it holds."""
+    asked = spec.merge_tolerance_mm if spec.merge is not None else spec.curved_gap_mm
+    if patches is None or patches.allowance is None or asked is None:
+        return None
+    if patches.allowance * part_set.scale_mm_per_unit <= asked * (1 + ROUNDING):
+        return None
+    size_mm = float(triangles.mesh.extents.max()) * part_set.scale_mm_per_unit
+    return spec.model_copy(update={"size_mm": size_mm, "mean_edge_mm": None, "fit": False})
 
 
 def _scaled(decomposition: Decomposition, scale: float) -> Decomposition:

@@ -14,6 +14,7 @@ CIRCLE_SEGMENTS = 48  # facets of a round shape: less than 0.01 mm off the circl
 
 CIRCLE_MM = 0.01
 NEEDLE = 5e-5  # some forty steps of single precision at a part's size
+MOST_FLIPS = 100  # of the sides of a part's flattest faces
 SLIVER = 1e-3  # corners of outlines that stand out by less are dropped: they are rounding, and make needles of faces
 
 
@@ -120,6 +121,7 @@ class Solid:
     def without_needles(self) -> "Solid":
         """With corners nearer than `NEEDLE` made one, which single precision may take past each other in part files.
 
+        Nor do faces with a corner so near to the side opposite stay, which it may take across: that side is flipped.
         As it is where there are none, or where the surface would be closed no more.
         """
         mesh = self.mesh()
@@ -127,8 +129,9 @@ class Solid:
         stands = np.arange(len(mesh.vertices))
         for a, b in short.tolist():
             stands[stands == stands[b]] = stands[a]
-        whole = coinciding_joined(mesh.vertices[stands], mesh.faces)
-        return Solid.of(whole) if len(short) and whole.is_closed_manifold else self
+        joined = coinciding_joined(mesh.vertices[stands], mesh.faces) if len(short) else mesh
+        whole = _caps_flipped(joined) if joined.is_closed_manifold else joined
+        return Solid.of(whole) if whole is not mesh and whole.is_closed_manifold else self
 
     # ---- measured
 
@@ -159,6 +162,35 @@ class Solid:
     def cross_section(self, z: float) -> Sequence[Floats]:
         """The polygons, each (n, 2), in which the plane at height z cuts the solid."""
         return [np.asarray(p, np.float64) for p in self.body.slice(z).to_polygons()]
+
+
+def _caps_flipped(mesh: TriMesh) -> TriMesh:
+    """The surface with the longest side of every face that is flatter than `NEEDLE` flipped, where that mends it."""
+    faces = mesh.faces.copy()
+    for _ in range(MOST_FLIPS):
+        tried = TriMesh(mesh.vertices, faces)
+        flat = np.flatnonzero(2 * tried.areas < NEEDLE * tried.side_lengths.max(axis=1))
+        flips = (_flipped(tried, face, int(tried.side_lengths[face].argmax())) for face in flat.tolist())
+        best = next((found for found in flips if found is not None), None)
+        if best is None:
+            return tried if (faces != mesh.faces).any() else mesh
+        faces = best
+    return TriMesh(mesh.vertices, faces)
+
+
+def _flipped(mesh: TriMesh, face: int, side: int) -> Ints | None:
+    """The faces with a side of one flipped; None where its new edge is there already or would bound flatter faces."""
+    a, b, c = np.roll(mesh.faces[face], -side).tolist()
+    pair = mesh.edge_faces[mesh.face_edges[face, side]]
+    other = int(pair[pair != face][0])
+    d = next(v for v in mesh.faces[other].tolist() if v not in (a, b))
+    faces = mesh.faces.copy()
+    faces[face], faces[other] = (a, d, c), (d, b, c)
+    new = TriMesh(mesh.vertices, faces[[face, other]])
+    flattest = float((new.areas / new.side_lengths.max(axis=1)).min())
+    there = (mesh.edges == (min(c, d), max(c, d))).all(axis=1).any()
+    was = float(mesh.areas[face] / mesh.side_lengths[face].max())
+    return None if there or flattest <= was else faces
 
 
 def widest_circle_mm(polygons: Floats) -> float:

@@ -235,7 +235,8 @@ def _placement(mesh: TriMesh, kit: KitDocument) -> Check:
         worst = max(worst, float(np.linalg.norm(placed - mesh.vertices[piece.corners], axis=1).max()))
     misfit = 0.0 if kit.metrics.merged is None else kit.metrics.merged.misfit_max_mm
     limit = max(PLACEMENT_MM, PLACEMENT_OF_ERROR * kit.metrics.error_max, misfit)
-    return Check("placement", proper and worst <= limit, f"corners within {worst:.4g} mm (limit {limit:.3g})")
+    right = proper and worst <= limit * (1 + RELATIVE)
+    return Check("placement", right, f"corners within {worst:.4g} mm (limit {limit:.3g})")
 
 
 def _order(mesh: TriMesh, kit: KitDocument) -> Check:

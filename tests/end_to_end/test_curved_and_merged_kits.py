@@ -47,3 +47,13 @@ def test_the_same_kit_comes_out_again(written, potato_file) -> None:
     again = make_kit(potato_file, kit.spec)
     for one, other in zip(kit.part_set.parts, again.part_set.parts, strict=True):
         assert other.solid.volume == pytest.approx(one.solid.volume, rel=1e-6)
+
+
+@pytest.mark.parametrize("size", [{}, {"mean_edge_mm": 60.0}], ids=["found", "mean edge"])
+def test_the_tolerance_that_is_asked_is_kept_whatever_the_size(potato_file, size) -> None:
+    """Finer processes have finer clearances, from which a size is guessed before it is known, than they have pieces."""
+    tolerance = {"merge_tolerance_mm": 1.0, "documents": False}
+    spec = KitSpec(**COMMON, **size, **tolerance, merge=2, process="sla", merge_shift_percent=0)
+    kit = make_kit(potato_file, spec)
+    assert 0.5 < kit.metrics.merged.misfit_max_mm <= 1.0
+    assert kit.spec.merge_tolerance_mm <= 1.0 + 1e-9

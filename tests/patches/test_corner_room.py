@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drkid.patches.agglomeration import agglomerated
-from drkid.patches.corner_room import DEPTH, HALF_WIDTH, corner_rooms, room
+from drkid.patches.corner_room import DEPTH, HALF_WIDTH, SIZES, corner_rooms, room
 from drkid.patches.matching import paired
 from drkid.patches.outline import outlined
 
@@ -46,3 +46,20 @@ def test_pieces_that_are_made_alike_keep_the_room_of_the_tightest_triangle(pebbl
     nearer[rooms.pairs[0, 0]] = ends[0].mean(axis=0)
     assert not rooms.enough(nearer)
     assert rooms.missing(nearer).max() > 0
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_lengths_that_are_held_leave_room_for_pockets_of_every_size(pebble, size) -> None:
+    """A corner is as wide as its inner edge asks for: as roomy as the tightest triangle's, or as it is now."""
+    pieces = [outlined(pebble, group) for group in paired(pebble, 0.01)]
+    rooms = corner_rooms(pebble, pieces)
+    least = {tuple(pair): length for pair, length in zip(rooms.pairs.tolist(), rooms.least.tolist(), strict=True)}
+    at, after, before = np.moveaxis(pebble.vertices[rooms.corners], 1, 0)
+    first, second = np.linalg.norm(after - at, axis=1), np.linalg.norm(before - at, axis=1)
+    now = np.linalg.norm(after - before, axis=1)
+    held = np.array([least[tuple(sorted(corner[1:]))] for corner in rooms.corners.tolist()])
+    angle = np.arccos((first**2 + second**2 - np.minimum(held, now) ** 2) / (2 * first * second))
+    wanted = rooms.least_rooms[SIZES.index(size)]
+    found = room(first, second, angle, size * pebble.mean_edge)
+    assert (found >= wanted - 1e-9).all()
+    assert (held < now).any()

@@ -167,20 +167,30 @@ def slab_mesh(shape: MergedClass, skirt_mm: float, thickness_mm: float) -> TriMe
     """The triangles, carried on beyond the outline by a skirt in their own planes, at half the thickness either way.
 
     Every point moves along the mitre of its triangles' normals, so that no triangle is thinner than stated: it keeps
-    its thickness where no more than three planes meet, and is a little thicker elsewhere.
+    its thickness where no more than three planes meet, and is a little thicker elsewhere, and where the skirt leaves
+    them.
     """
     normals, n = _face_normals(shape), len(shape.corners)
     points = np.vstack([shape.corners, shape.inner])
     around = [np.flatnonzero((shape.faces == i).any(axis=1)) for i in range(len(points))]
     at_side = [np.unique([shape.side_face[i - 1], shape.side_face[i]]) for i in range(n)]
     mitre = np.stack([_mitre(normals[own]) for own in [*around, *at_side]])
-    points = np.vstack([points, shape.corners + skirt_mm * _outward(shape)])
-    count, shift, a = len(points), mitre * thickness_mm / 2, np.arange(n)
+    out = skirt_mm * _outward(shape)
+    off = np.stack(
+        [
+            normals[own] @ way
+            for own, way in zip(shape.side_face[np.stack([np.arange(n) - 1, np.arange(n)], axis=1)], out, strict=True)
+        ]
+    )
+    below, above = (np.maximum(np.append(np.zeros(len(points)), x.max(axis=1)), 0.0) for x in (-off, off))
+    points = np.vstack([points, shape.corners + out])
+    count, a = len(points), np.arange(n)
+    up, down = (mitre * (thickness_mm / 2 + more)[:, None] for more in (below, above))
     b, s = np.roll(a, -1), a + count - n
     t = np.roll(s, -1)
     upper = np.vstack([shape.faces, np.stack([b, a, s], axis=1), np.stack([b, s, t], axis=1)])
     walls = [np.stack([s, t, t + count], axis=1), np.stack([s, t + count, s + count], axis=1)]
-    return TriMesh(np.vstack([points - shift, points + shift]), np.vstack([upper[:, ::-1], upper + count, *walls]))
+    return TriMesh(np.vstack([points - down, points + up]), np.vstack([upper[:, ::-1], upper + count, *walls]))
 
 
 def _outward(shape: MergedClass) -> Floats:

@@ -1,8 +1,8 @@
 """Corner room: how short an inner edge of a merged piece may become before two pockets meet in the corner opposite.
 
 Lengths alone are known here, no connector. A pocket as wide and as deep as in the smallest print that pockets allow
-stands for it: no corner may become tighter to it than the tightest corner of the unmerged triangles, at which every
-print has its walls.
+stands for it, and a smaller one for that in larger prints: no corner may become tighter to either than the tightest
+corner of the unmerged triangles, at which every print has its walls.
 """
 
 from dataclasses import dataclass
@@ -13,6 +13,7 @@ from drkid.mesh import Floats, Ints, TriMesh
 from drkid.patches.outline import Outlined, corner_angles
 
 HALF_WIDTH, DEPTH = 0.11, 0.2  # of a pocket, in mean edges of the smallest print
+SIZES = (1.0, 0.85)  # of the pockets
 HALVINGS = 40
 SPARE = 0.0015  # of the mean edge: how much more room is aimed at than is needed, since no length is met exactly
 ROUNDING = 0.0002  # of the mean edge: less room than that is not missed
@@ -23,14 +24,14 @@ NARROWEST = 0.1  # radians: no corner that is looked for is narrower
 class CornerRooms:
     """Corners of M_f at which two pockets of one piece meet, and what keeps them apart.
 
-    `corners` (n, 3) are the vertices at a corner, after it and before it; `least_room` is what the tightest triangle
-    has. At `least` (m,) lengths of the inner edges `pairs` (m, 2) opposite, and sides as they are, corners have that
-    and a little to spare, or as much as they have now.
+    `corners` (n, 3) are the vertices at a corner, after it and before it; `least_rooms` are what the tightest triangle
+    has beside pockets of the `SIZES`. At `least` (m,) lengths of the inner edges `pairs` (m, 2) opposite, and sides as
+    they are, corners have that and a little to spare, or as much as they have now.
     """
 
     mean_edge: float
     corners: Ints
-    least_room: float
+    least_rooms: tuple[float, ...]
     pairs: Ints
     least: Floats
 
@@ -46,13 +47,19 @@ class CornerRooms:
         at, after, before = np.moveaxis(vertices[self.corners], 1, 0)
         first, second = np.linalg.norm(after - at, axis=1), np.linalg.norm(before - at, axis=1)
         cosine = np.einsum("nk,nk->n", after - at, before - at) / (first * second)
-        rooms = room(first, second, np.arccos(np.clip(cosine, -1, 1)), self.mean_edge)
-        return bool(rooms.min() >= self.least_room - ROUNDING * self.mean_edge)
+        angle = np.arccos(np.clip(cosine, -1, 1))
+        return all(
+            room(first, second, angle, size * self.mean_edge).min() >= least - ROUNDING * self.mean_edge
+            for size, least in zip(SIZES, self.least_rooms, strict=True)
+        )
 
 
-def room(first: Floats, second: Floats, angle: Floats, mean_edge: float) -> Floats:
-    """(n,): distance of the pockets amid sides of these lengths (n,) that meet at `angle` (n,); minus any overlap."""
-    half, depth = HALF_WIDTH * mean_edge, DEPTH * mean_edge
+def room(first: Floats, second: Floats, angle: Floats, size: float) -> Floats:
+    """(n,): distance of the pockets amid sides of these lengths (n,) that meet at `angle` (n,); minus any overlap.
+
+    Pockets are those of the smallest print whose mean edge is `size`.
+    """
+    half, depth = HALF_WIDTH * size, DEPTH * size
     x, y = np.array([-half, half, -half, half]), np.array([0.0, 0.0, depth, depth])
     cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
     distance, separation = np.full(len(first), np.inf), np.full(len(first), -np.inf)
@@ -69,7 +76,8 @@ def room(first: Floats, second: Floats, angle: Floats, mean_edge: float) -> Floa
 def corner_rooms(mesh: TriMesh, pieces: list[Outlined]) -> CornerRooms:
     """Those of all triangles that have two of their sides on the outline of their piece, or all three."""
     angle, sides = corner_angles(mesh), mesh.side_lengths
-    rooms = room(sides.ravel(), np.roll(sides, 1, axis=1).ravel(), angle.ravel(), mesh.mean_edge)
+    every = sides.ravel(), np.roll(sides, 1, axis=1).ravel(), angle.ravel()
+    rooms = tuple(float(room(*every, size * mesh.mean_edge).min()) for size in SIZES)
     rows = np.array(
         [
             (piece.faces[face], mesh.faces[piece.faces[face]].tolist().index(piece.vertices[i]))
@@ -84,12 +92,18 @@ def corner_rooms(mesh: TriMesh, pieces: list[Outlined]) -> CornerRooms:
     low, high = np.full(len(rows), NARROWEST), angle[face, corner]
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        enough = room(after, before, middle, mesh.mean_edge) >= rooms.min() + SPARE * mesh.mean_edge
+        enough = np.all(
+            [
+                room(after, before, middle, size * mesh.mean_edge) >= least + SPARE * mesh.mean_edge
+                for size, least in zip(SIZES, rooms, strict=True)
+            ],
+            axis=0,
+        )
         low, high = np.where(enough, low, middle), np.where(enough, middle, high)
-    least = np.sqrt(after**2 + before**2 - 2 * after * before * np.cos(high))
+    shortest = np.sqrt(after**2 + before**2 - 2 * after * before * np.cos(high))
     own = mesh.faces[face]
     corners = np.stack([np.take_along_axis(own, (corner[:, None] + k) % 3, 1)[:, 0] for k in range(3)], axis=1)
     pairs, index = np.unique(np.sort(corners[:, 1:], axis=1), axis=0, return_inverse=True)
     longest = np.zeros(len(pairs))
-    np.maximum.at(longest, index.ravel(), least)
-    return CornerRooms(mesh.mean_edge, corners, float(rooms.min()), pairs, longest)
+    np.maximum.at(longest, index.ravel(), shortest)
+    return CornerRooms(mesh.mean_edge, corners, rooms, pairs, longest)

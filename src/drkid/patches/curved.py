@@ -68,6 +68,8 @@ def units_per_mm(decomposition: Decomposition, spec: KitSpec) -> float:
         return 1 / decomposition.scale_mm_per_unit
     if spec.size_mm is not None:
         return float(mesh.extents.max()) / spec.size_mm
+    if spec.mean_edge_mm is not None:
+        return mesh.mean_edge / spec.mean_edge_mm
     return mesh.mean_edge / (MEAN_EDGE_CLEARANCES * spec.preset.clearance_mm)
 
 
