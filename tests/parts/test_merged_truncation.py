@@ -30,7 +30,7 @@ def dented(seed: int) -> TriMesh:
 @settings(max_examples=3, phases=[Phase.generate])
 @given(st.integers(0, 30), st.sampled_from([2, 5]))
 def test_no_two_merged_pieces_share_anything_and_walls_stay(seed, merge) -> None:
-    d, spec = decomposed(dented(seed)), KitSpec(merge=merge, size_mm=160)
+    d, spec = decomposed(dented(seed)), KitSpec(merge=merge, size_mm=160, process="sla")
     patches = make_patches(d, d.mesh, spec)
     assert patches is not None
     parts = make_parts(d, spec, patches=patches)
