@@ -18,7 +18,7 @@ from real_shapes import LABELS, require_data
 
 from drkid.congruence import decompose
 from drkid.curved_patch import barycentric_grid
-from drkid.kit import Decomposition, Surface
+from drkid.kit import WALL, Decomposition, Surface
 from drkid.measure import bend_radians, hausdorff, project
 from drkid.mesh import TriMesh
 from drkid.metrics import SAMPLING_SEED
@@ -46,7 +46,7 @@ CURVED: tuple[tuple[str, dict[str, object]], ...] = (
 MERGES = (2, 5, 6, 7)
 SHIFTS_AND_TOLERANCES = ((0.0, 0.02), (0.0, 0.2), (0.0, 1.0), (5.0, 0.02))  # percent of the edge, mm
 FINE = 10_000  # places at least at which normals are compared
-WALLS_MM = 0.02  # tolerance up to which the notes of pieces are looked at for walls that are too thin
+WALLS_MM = 0.02  # tolerance up to which pieces are made, and their walls measured
 Row = dict[str, float | int | str]
 
 
@@ -114,7 +114,7 @@ def merged_row(decomposition: Decomposition, surface: Surface, size_mm: float, o
     patches = make_patches(decomposition, surface.mesh, spec)
     assert patches is not None, "merge was asked for"
     assert patches.misfit is not None, "merged pieces have a misfit"
-    notes = make_parts(decomposition, spec, patches=patches).notes if spec.merge_tolerance_mm <= WALLS_MM else ()
+    found = make_parts(decomposition, spec, patches=patches).findings if spec.merge_tolerance_mm <= WALLS_MM else ()
     scale = size_mm / float(decomposition.mesh.extents.max())
     apart = hausdorff(surface.mesh, patches.decomposition.mesh, np.random.default_rng(SAMPLING_SEED))
     return {
@@ -126,7 +126,7 @@ def merged_row(decomposition: Decomposition, surface: Surface, size_mm: float, o
         "pieces": len(patches.pieces),
         "moulds": len(patches.merged),
         "single_triangles": sum(len(piece.faces) == 1 for piece in patches.pieces),
-        "thin_walls": sum("have walls of" in note for note in notes),
+        "thin_walls": sum(one.what == WALL and not one.is_met for one in found),
         "misfit_max_mm": float(patches.misfit.max()) * scale,
         "distance_mean_percent": apart.mean * 100 / surface.mesh.diagonal,
     }
