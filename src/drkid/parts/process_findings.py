@@ -55,7 +55,7 @@ def wall_findings(parts: Sequence[Part], pocket_walls_mm: Sequence[float], least
     """The thinnest wall of every merged piece, `pocket_walls_mm` being those around their pockets."""
     for part, pocket_wall in zip(parts, pocket_walls_mm, strict=True):
         wall = min(pocket_wall, thinnest_wall_mm(part.solid.mesh()))
-        remedy = "--merge-shift-percent 0 and --merge 2 merge more gently"
+        remedy = "make the print larger, or merge more gently: --merge-shift-percent 0, --merge 2"
         yield Finding(_subject(part), WALL, least_mm, wall, "mm", "at least", remedy)
 
 
