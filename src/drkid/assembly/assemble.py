@@ -148,8 +148,9 @@ def _closure_notes(closure: Closure) -> Iterator[str]:
 def _swing_notes(swing: Swing, connector: ConnectorKind) -> Iterator[str]:
     if swing.blocked and connector != RIGID:
         yield (
-            f"{swing.blocked} joints cannot turn by {swing.wanted_degrees:g}° both ways; the tightest has "
-            f"{min(swing.inward_degrees, swing.outward_degrees):.1f}°."
+            f"{swing.blocked} joints may turn by less than {swing.wanted_degrees:g}° both ways: what the pieces reach "
+            f"round the axis, taken all along the joint, leaves {min(swing.inward_degrees, swing.outward_degrees):.1f}° "
+            "at the tightest."
         )
 
 
