@@ -147,10 +147,10 @@ def _closure_notes(closure: Closure) -> Iterator[str]:
 
 def _swing_notes(swing: Swing, connector: ConnectorKind) -> Iterator[str]:
     if swing.blocked and connector != RIGID:
+        tightest = min(swing.inward_degrees, swing.outward_degrees)
         yield (
             f"{swing.blocked} joints may turn by less than {swing.wanted_degrees:g}° both ways: what the pieces reach "
-            f"round the axis, taken all along the joint, leaves {min(swing.inward_degrees, swing.outward_degrees):.1f}° "
-            "at the tightest."
+            f"round the axis, taken all along the joint, leaves {tightest:.1f}° at the tightest."
         )
 
 
