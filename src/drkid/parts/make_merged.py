@@ -58,8 +58,7 @@ def merged_parts(patches: Patches, of_triangles: PartSet, spec: KitSpec, notes: 
     )
     walls = [_pocket_wall_mm(s, i, b, dimensions) for s, i, b in zip(shapes, insets, bodies, strict=True)]
     parts = tuple(_part(k, shape, bodies[k], dimensions) for k, shape in enumerate(shapes))
-    pockets = [_deep(body, shape, dimensions) for shape, body in zip(shapes, bodies, strict=True)]
-    parts, feet = _printable(parts, shapes, pockets, dimensions, spec)
+    parts, feet = _printable(parts, shapes, bodies, dimensions, spec)
     face_part = np.zeros(len(mesh_mm.faces), np.int64)
     for piece in patches.pieces:
         face_part[list(piece.faces)] = piece.class_index
@@ -90,6 +89,11 @@ def _merged_insets(
     return [_insets(mesh_mm, _scaled(shape, scale), own, dimensions, spec) for shape, own in zipped]
 
 
+def _at_sides(shape: MergedClass, space: Solid, dimensions: Dimensions) -> list[Solid]:
+    """A space in connector coordinates as it lies at every side of a shape."""
+    return [space.moved(frame) for frame in outline_frames(shape, dimensions.key_bend_degrees / 2)]
+
+
 def _pocket_room(shape: MergedClass, dimensions: Dimensions) -> Solid:
     """All pockets of a shape with a wall around them; nothing where there are none."""
     if dimensions.connector == "none":
@@ -101,7 +105,7 @@ def _pocket_room(shape: MergedClass, dimensions: Dimensions) -> Solid:
         pocket_depth_mm=dimensions.pocket_depth_mm + wall,
         pocket_height_mm=dimensions.pocket_height_mm + 2 * wall,
     )
-    return Solid.union([pocket(wider).moved(frame) for frame in outline_frames(shape, dimensions.key_bend_degrees / 2)])
+    return Solid.union(_at_sides(shape, pocket(wider), dimensions))
 
 
 def _pocket_wall_mm(shape: MergedClass, insets: Floats, body: Solid, dimensions: Dimensions) -> float:
@@ -109,8 +113,7 @@ def _pocket_wall_mm(shape: MergedClass, insets: Floats, body: Solid, dimensions:
     most = REACH * dimensions.min_wall_mm
     if dimensions.connector == "none":
         return most
-    frames = outline_frames(shape, dimensions.key_bend_degrees / 2)
-    pockets = [body & pocket(dimensions).moved(frame) for frame in frames]
+    pockets = [body & space for space in _at_sides(shape, pocket(dimensions), dimensions)]
     gaps = [one.gap(other, most) for one, other in combinations(pockets, 2)]
     skirt = max(-float(insets.min()), 0.0) + SKIRT_MM
     slab = Solid.of(slab_mesh(shape, skirt, dimensions.thickness_mm - FILM_MM))
@@ -154,7 +157,7 @@ def _insets(
 def _part(index: int, shape: MergedClass, body: Solid, dimensions: Dimensions) -> Part:
     frames = outline_frames(shape, dimensions.key_bend_degrees / 2)
     if dimensions.connector != "none":
-        body = body.minus_all([pocket(dimensions).moved(frame) for frame in frames])
+        body = body.minus_all(_at_sides(shape, pocket(dimensions), dimensions))
     return Part(index, _handedness(shape), shape.corners, frames, body.without_needles())
 
 
@@ -163,18 +166,20 @@ def _deep(body: Solid, shape: MergedClass, dimensions: Dimensions) -> Floats:
     if dimensions.connector == "none":
         return np.zeros((0, 3))
     half = pocket(dimensions).beyond(np.array([0.0, 1.0, 0.0]), dimensions.pocket_depth_mm / 2)
-    frames = outline_frames(shape, dimensions.key_bend_degrees / 2)
-    return np.vstack([(body & half.moved(frame)).mesh().vertices for frame in frames])
+    return np.vstack([(body & space).mesh().vertices for space in _at_sides(shape, half, dimensions)])
 
 
 def _printable(
     parts: tuple[Part, ...],
     shapes: tuple[MergedClass, ...],
-    deep: list[Floats],
+    bodies: list[Solid],
     dimensions: Dimensions,
     spec: KitSpec,
 ) -> tuple[tuple[Part, ...], list[str]]:
-    """The parts with feet where they need them to print without supports, and a note that tells which have one."""
+    """The parts with feet where they need them to print without supports, and a note that tells which have one.
+
+    `bodies` are the parts before their pockets were cut.
+    """
     longest = spec.preset.longest_bridge_mm
     if longest is None:
         return parts, []
@@ -182,13 +187,13 @@ def _printable(
     found = [
         with_foot(
             part.solid,
-            own,
+            _deep(body, shape, dimensions),
             thickness,
             wall,
             longest,
             reflection(shape.corners, shape.mirror) if shape.mirror else None,
         )
-        for part, shape, own in zip(parts, shapes, deep, strict=True)
+        for part, shape, body in zip(parts, shapes, bodies, strict=True)
     ]
     footed = [part.name for part, (_, depth) in zip(parts, found, strict=True) if depth]
     note = (
